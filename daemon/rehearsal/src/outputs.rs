@@ -24,7 +24,7 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
         let classes = true_classes(&mission.camera.world, bounds, mission.cell_m());
         write_map(&dir.join("truth.png"), &classes, bounds)?;
     }
-    let panorama = panorama(mission).map_err(|e| UserError::Failed(e.to_string()))?;
+    let panorama = panorama(mission).map_err(UserError::failed)?;
     scenecast_files::write_whole(&dir.join("mission.png"), &panorama)?;
     write_quality(mission, dir)?;
     let exemplars = dir.join("exemplars");
@@ -35,7 +35,7 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     scenecast_files::write_whole(&dir.join("frames.log"), mission.frames().text().as_bytes())?;
     let mut json = report.json.clone();
     json["wall"] = wall;
-    let text = serde_json::to_string_pretty(&json).map_err(|e| UserError::Failed(e.to_string()))? + "\n";
+    let text = serde_json::to_string_pretty(&json).map_err(UserError::failed)? + "\n";
     scenecast_files::write_whole(&dir.join("report.json"), text.as_bytes())
 }
 
@@ -44,7 +44,7 @@ fn write_quality(mission: &Mission, dir: &Path) -> Result<(), UserError> {
     let samples = mission.quality_series();
     scenecast_files::write_whole(&dir.join("quality.csv"), quality_csv(samples).as_bytes())?;
     let title = format!("{} bit/s, seed {}", mission.config.link.budget_bps, mission.seed);
-    let svg = quality_plot(&mission_panels(samples), &title).map_err(|e| UserError::Failed(e.to_string()))?;
+    let svg = quality_plot(&mission_panels(samples), &title).map_err(UserError::failed)?;
     scenecast_files::write_whole(&dir.join("quality.svg"), svg.as_bytes())
 }
 

@@ -267,7 +267,7 @@ impl Truth {
         }
         let bounds = cells_of(area, cell_m);
         let grid = true_classes(world, bounds, cell_m);
-        let png = label_picture::encode_within(&grid, bounds).map_err(|e| UserError::Failed(e.to_string()))?;
+        let png = label_picture::encode_within(&grid, bounds).map_err(UserError::failed)?;
         let mut found: Vec<u8> = grid.iter().map(|(_, value)| value).collect();
         found.sort_unstable();
         found.dedup();

@@ -73,7 +73,7 @@ pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result
     let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).log_internal_errors(false);
     let _ = tracing_subscriber::registry().with(filter).with(log).with(record::LogLines).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
-    let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
+    let runtime = runtime.map_err(UserError::failed)?;
     // Of a boxed future the runtime has one copy of the code, of another one several.
     let future: Pin<Box<dyn Future<Output = _>>> = Box::pin(future);
     let result = runtime.block_on(future);

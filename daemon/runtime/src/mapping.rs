@@ -176,9 +176,7 @@ impl Work {
         // A recording may say by its scale that images of other sizes show as much.
         let has_one_size = matches!(frame.picture, FramePicture::Received(_)) || frame.scale == 1.0;
         let read = frame.take_image().and_then(|read| match &read.view {
-            None if has_one_size => {
-                self.size.check(read.image.dimensions()).map(|()| read).map_err(|e| UserError::Input(e.to_string()))
-            }
+            None if has_one_size => self.size.check(read.image.dimensions()).map(|()| read).map_err(UserError::input),
             _ => Ok(read),
         });
         match read {

@@ -143,12 +143,11 @@ fn tenths(seconds: f64) -> f64 {
 /// Prints figures: lines at a terminal, one line of JSON in a pipe or a file, or with `json` anywhere.
 pub fn print_figures(figures: &impl Serialize, json: bool) -> Result<(), UserError> {
     let as_json = json || !std::io::stdout().is_terminal();
-    let failed = |e: serde_json::Error| UserError::Failed(e.to_string());
     if as_json {
         // A struct keeps the order of its members only if it is written at once.
-        outln!("{}", serde_json::to_string(figures).map_err(failed)?);
+        outln!("{}", serde_json::to_string(figures).map_err(UserError::failed)?);
     } else {
-        out!("{}", lines(&serde_json::to_value(figures).map_err(failed)?));
+        out!("{}", lines(&serde_json::to_value(figures).map_err(UserError::failed)?));
     }
     Ok(())
 }

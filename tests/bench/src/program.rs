@@ -21,7 +21,7 @@ impl ProgramArgument {
     pub(crate) fn path(&self) -> Result<PathBuf, UserError> {
         let path = match &self.file {
             Some(file) => file.clone(),
-            None => std::env::current_exe().map_err(|e| UserError::Failed(e.to_string()))?.with_file_name("scenecast"),
+            None => std::env::current_exe().map_err(UserError::failed)?.with_file_name("scenecast"),
         };
         let is_release = path.parent().is_some_and(|folder| folder.ends_with("release"));
         let build = if is_release { " --release" } else { "" };

@@ -89,7 +89,7 @@ pub(crate) fn fly_all<R>(
 }
 
 pub(crate) fn print_json(all: &serde_json::Value) -> Result<(), UserError> {
-    println!("{}", serde_json::to_string_pretty(all).map_err(|e| UserError::Failed(e.to_string()))?);
+    println!("{}", serde_json::to_string_pretty(all).map_err(UserError::failed)?);
     Ok(())
 }
 

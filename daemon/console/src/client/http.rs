@@ -59,7 +59,7 @@ impl Client {
 
     /// Sends an order and reads its receipt.
     pub(super) async fn post<T: DeserializeOwned>(&self, path: &str, order: &impl Serialize) -> Result<T, UserError> {
-        let body = serde_json::to_vec(order).map_err(|e| UserError::Failed(e.to_string()))?;
+        let body = serde_json::to_vec(order).map_err(UserError::failed)?;
         let response = self.send(Method::POST, path, body.into()).await?;
         serde_json::from_slice(&self.body(response).await?).map_err(|e| self.unreadable(&e))
     }
@@ -76,7 +76,7 @@ impl Client {
 
     /// Sends an order, whose receipt does not matter.
     pub async fn send_order(&self, path: &str, order: &impl Serialize) -> Result<(), UserError> {
-        let body = serde_json::to_vec(order).map_err(|e| UserError::Failed(e.to_string()))?;
+        let body = serde_json::to_vec(order).map_err(UserError::failed)?;
         self.send(Method::POST, path, body.into()).await.map(drop)
     }
 
@@ -122,7 +122,7 @@ impl Client {
         if let Some(token) = &self.token {
             request = request.header(header::AUTHORIZATION, format!("Bearer {}", **token));
         }
-        let request = request.body(Full::new(body)).map_err(|e| UserError::Failed(e.to_string()))?;
+        let request = request.body(Full::new(body)).map_err(UserError::failed)?;
         sender.send_request(request).await.map_err(broken)
     }
 

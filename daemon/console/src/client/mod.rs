@@ -34,5 +34,5 @@ pub fn block_on(command: impl Future<Output = Result<(), UserError>>) -> Result<
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     // Of a boxed future the runtime has one copy of the code, of another one several.
     let command: Pin<Box<dyn Future<Output = _>>> = Box::pin(command);
-    runtime.map_err(|e| UserError::Failed(e.to_string()))?.block_on(command)
+    runtime.map_err(UserError::failed)?.block_on(command)
 }

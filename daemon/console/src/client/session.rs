@@ -70,7 +70,7 @@ impl Session {
 }
 
 pub(super) fn json(value: &impl Serialize) -> Result<String, UserError> {
-    serde_json::to_string(value).map_err(|e| UserError::Failed(e.to_string()))
+    serde_json::to_string(value).map_err(UserError::failed)
 }
 
 /// Writes a text or JSON to standard output; false if the reader has closed it.

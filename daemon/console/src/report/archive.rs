@@ -49,7 +49,7 @@ impl Dive {
     pub fn zip(&self) -> Result<Vec<u8>, UserError> {
         let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::new())));
         archive.add("report.html", self.html().as_bytes())?;
-        let json = serde_json::to_string_pretty(&self.json()).map_err(|e| UserError::Failed(e.to_string()))?;
+        let json = serde_json::to_string_pretty(&self.json()).map_err(UserError::failed)?;
         archive.add("report.json", json.as_bytes())?;
         let event = |(at_s, event): &(f64, _)| {
             let Event { vehicle, source, text, .. } = event;
@@ -60,7 +60,7 @@ impl Dive {
         for (state, vehicle) in self.vehicles() {
             self.add_vehicle(&mut archive, state, vehicle)?;
         }
-        let bytes = archive.0.finish().map_err(|e| UserError::Failed(e.to_string()))?;
+        let bytes = archive.0.finish().map_err(UserError::failed)?;
         Ok(bytes.into_inner())
     }
 

@@ -33,7 +33,7 @@ impl Report {
             errln!("scenecast: a part of the record could not be read: {damage}");
         }
         if self.json {
-            let text = serde_json::to_string_pretty(&dive.json()).map_err(|e| UserError::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&dive.json()).map_err(UserError::failed)?;
             outln!("{text}");
             return Ok(());
         }

@@ -25,17 +25,18 @@ const NONE: u8 = 255;
 ///
 /// `cell_px` is the edge of a cell in pixels of the mosaic, where the annotations are an image.
 pub(crate) fn quality(map: &LabelledMap, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
-    let refused = |e: scenecast_scoring::AnnotationError| UserError::Input(e.to_string());
     match annotated {
         Annotated::Pixels { classes, ignore } => {
-            let annotations = Annotations::new(classes, classes.dimensions(), cell_px, ignore).map_err(refused)?;
+            let annotations =
+                Annotations::new(classes, classes.dimensions(), cell_px, ignore).map_err(UserError::input)?;
             let (columns, rows) = annotations.size();
             Ok(score(&LabelGrid::from_map(&map.flat, 0, -1, columns, rows), &annotations))
         }
         Annotated::Places(places) => {
             let sheet = LayerSheet::new(&map.volume, places)?;
             let classes = sheet.classes(places, map.cell_m);
-            let annotations = Annotations::new(&classes, classes.dimensions(), 1.0, &[NONE]).map_err(refused)?;
+            let annotations =
+                Annotations::new(&classes, classes.dimensions(), 1.0, &[NONE]).map_err(UserError::input)?;
             Ok(score(&sheet.labels(&map.volume), &annotations))
         }
     }

@@ -85,7 +85,7 @@ pub(crate) fn write(labelled: LabelledMap, dir: &Path) -> Result<(), UserError> 
     let label = |topic| topics.binary_search(&topic).map_or(0, |index| (index + 1).min(254)) as u8;
     let bounds = around(&map)?;
     let grid: LabelGrid = map.iter().map(|cell| (Cell::new(cell.x, cell.y), label(cell.topic))).collect();
-    let png = encode_within(&grid, bounds).map_err(|e| UserError::Failed(e.to_string()))?;
+    let png = encode_within(&grid, bounds).map_err(UserError::failed)?;
     let mut table = "x,y,z,label,confidence,perplexity\n".to_owned();
     for cell in &volume {
         let [x, y, z] = centre_of([cell.x, cell.y, cell.z], cell_m);

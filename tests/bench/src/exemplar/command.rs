@@ -62,7 +62,7 @@ impl ExemplarBench {
         if self.json {
             let arrivals: serde_json::Map<String, _> = rows.iter().map(|(n, a)| ((*n).to_owned(), json!(a))).collect();
             let text = serde_json::to_string_pretty(&json!({ "arrival": arrivals, "bytes": bytes }));
-            println!("{}", text.map_err(|e| UserError::Failed(e.to_string()))?);
+            println!("{}", text.map_err(UserError::failed)?);
         } else {
             print(&rows, &bytes);
         }

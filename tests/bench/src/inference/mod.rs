@@ -98,7 +98,7 @@ fn measure(
 ) -> Result<InferenceRow, UserError> {
     let model = mission.mapper().model();
     if batch.as_ref().is_none_or(|last| !last.is_of(model)) {
-        *batch = Some(Batch::new(model).map_err(|e| UserError::Failed(e.to_string()))?);
+        *batch = Some(Batch::new(model).map_err(UserError::failed)?);
     }
     let nats = |map: &LabelGrid| mission.map_information(map).map(|information| information.rigid_nats);
     Ok(InferenceRow {

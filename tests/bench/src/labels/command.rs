@@ -73,7 +73,7 @@ impl LabelsBench {
             if let Some(dir) = &self.out {
                 let mut bytes = Cursor::new(Vec::new());
                 let drawn = picture::of(&site, &flights).write_to(&mut bytes, image::ImageFormat::Png);
-                drawn.map_err(|e| UserError::Failed(e.to_string()))?;
+                drawn.map_err(UserError::failed)?;
                 write_whole(&dir.join(format!("{}.png", site.name.replace(' ', "-"))), bytes.get_ref())?;
             }
             if !self.json {

@@ -36,11 +36,11 @@ impl LocalisationBench {
                 "3 km, drift 1 % of the distance, a fix each 10 s, 10 % lost, 10 % outliers; seed {}",
                 self.seeds.first
             );
-            let svg = localisation_plot(&tracks, &title).map_err(|e| UserError::Failed(e.to_string()))?;
+            let svg = localisation_plot(&tracks, &title).map_err(UserError::failed)?;
             write_whole(&dir.join("localisation.svg"), svg.as_bytes())?;
         }
         if self.json {
-            let text = serde_json::to_string_pretty(&found).map_err(|e| UserError::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&found).map_err(UserError::failed)?;
             println!("{text}");
         } else {
             print(&found);

@@ -57,7 +57,7 @@ fn send(setting: &RasterSetting, classes: &Raster, seed: u64) -> Result<Annotate
     let began = rig.now;
     for item in items(classes) {
         let taken = map.handle_item(&item, ForeignSource::Labels, None, 0.0);
-        taken.map_err(|why| UserError::Input(why.to_string()))?;
+        taken.map_err(UserError::input)?;
     }
     let is_equal = |rig: &LinkRig<MapSource, Replica>, map: &ForeignMap| copy(rig).shown() == map.labels();
     while (map.has_changes() || !is_equal(&rig, &map)) && rig.now.since(began) < GIVE_UP {

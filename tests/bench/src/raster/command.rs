@@ -90,7 +90,7 @@ impl RasterBench {
             rows.insert(name, json!(figures));
         }
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?);
+            println!("{}", serde_json::to_string_pretty(&rows).map_err(UserError::failed)?);
         }
         if all { Ok(()) } else { Err(UserError::Failed("a map did not arrive within an hour".to_owned())) }
     }
@@ -123,7 +123,7 @@ impl RasterBench {
         }
         if self.json {
             let all: serde_json::Map<String, _> = rows.iter().map(|(name, f)| (name.clone(), json!(f))).collect();
-            println!("{}", serde_json::to_string_pretty(&all).map_err(|e| UserError::Failed(e.to_string()))?);
+            println!("{}", serde_json::to_string_pretty(&all).map_err(UserError::failed)?);
         } else {
             self.print(&rows);
         }

@@ -172,7 +172,7 @@ fn measure<S: Sends>(
             let slot =
                 Slot::Utility(Utility { exploration: (rig.now.as_secs_f64() as i64 % 90) as i8, ..Utility::default() });
             let issued = rig.surface.end_mut().issue(rig.address, slot, rig.now);
-            order = Some((issued.map_err(|e| UserError::Failed(e.to_string()))?, rig.now));
+            order = Some((issued.map_err(UserError::failed)?, rig.now));
         }
         rig.run(LOOK);
         watch.look(copy(&rig), rig.now);

@@ -50,7 +50,7 @@ impl RestartBench {
             }
         })?;
         if self.json {
-            let text = serde_json::to_string_pretty(&figures).map_err(|e| UserError::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&figures).map_err(UserError::failed)?;
             println!("{text}");
         } else {
             let (median, worst) = figures.page_s;

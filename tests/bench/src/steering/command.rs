@@ -54,7 +54,7 @@ impl SteeringBench {
 
     fn finish(&self, figures: &SteeringFigures) -> Result<(), UserError> {
         if self.json {
-            println!("{}", serde_json::to_string_pretty(figures).map_err(|e| UserError::Failed(e.to_string()))?);
+            println!("{}", serde_json::to_string_pretty(figures).map_err(UserError::failed)?);
         } else {
             println!("median gain {:.2}; longest stay {} s", figures.median_gain, figures.longest_stay_s);
         }

@@ -71,7 +71,7 @@ impl Flight {
         let (vehicle, now) = (self.mission.address(), self.mission.now());
         let order = [(label, weight)].into();
         let version = self.mission.surface_mut().set_utility(vehicle, &order, (exploration, 0.0), now);
-        version.map(drop).map_err(|fault| UserError::Failed(fault.to_string()))
+        version.map(drop).map_err(UserError::failed)
     }
 
     pub(super) fn fly_until(&mut self, end_s: u32) -> Result<(), UserError> {

@@ -16,7 +16,7 @@ const PAUSE_S: f64 = 2.0;
 /// now. The mission itself stays as it is.
 pub(super) fn labels_of(mission: &Mission, area: &Area) -> Result<LabelGrid, UserError> {
     let copied = Mapper::restore(mission.config(), None, &mission.mapper().save(0));
-    let mut mapper = copied.map_err(|fault| UserError::Failed(fault.to_string()))?.mapper;
+    let mut mapper = copied.map_err(UserError::failed)?.mapper;
     let mut world = mission.world().clone();
     let (camera, survey) = (&mission.config().camera, &mission.config().survey);
     let navigator = mission.vehicle().navigator();

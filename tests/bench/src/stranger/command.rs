@@ -33,7 +33,7 @@ impl StrangerBench {
     pub(crate) fn run(self) -> Result<(), UserError> {
         let rows = self.measure();
         if self.json {
-            let text = serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&rows).map_err(UserError::failed)?;
             println!("{text}");
         } else {
             rows.iter().for_each(print);

@@ -62,7 +62,7 @@ impl WideBench {
         let figures = wide(&config, setting, self.seed, &mut |share| progress.show(share), &mut keep)?;
         drop(progress);
         if self.json {
-            let text = serde_json::to_string_pretty(&figures).map_err(|e| UserError::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&figures).map_err(UserError::failed)?;
             println!("{text}");
         } else {
             print(&figures);

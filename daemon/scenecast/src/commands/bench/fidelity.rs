@@ -42,13 +42,13 @@ impl FidelityBench {
             }
         })?;
         if self.json {
-            let text = serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&rows).map_err(UserError::failed)?;
             outln!("{text}");
         }
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
             let title = format!("Mutual information of the maps with the true classes, seed {}", self.world.seed);
-            let svg = quality_plot(&fidelity_panels(&rows), &title).map_err(|e| UserError::Failed(e.to_string()))?;
+            let svg = quality_plot(&fidelity_panels(&rows), &title).map_err(UserError::failed)?;
             write_whole(&dir.join("fidelity.svg"), svg.as_bytes())?;
         }
         Ok(())

@@ -21,20 +21,16 @@ pub(crate) struct LinkBench {
 impl LinkBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("link");
-        let table = link_table(self.seed, &mut |share| progress.show(share)).map_err(failed)?;
+        let table = link_table(self.seed, &mut |share| progress.show(share)).map_err(UserError::failed)?;
         drop(progress);
         if self.json {
-            outln!("{}", serde_json::to_string_pretty(&table).map_err(failed)?);
+            outln!("{}", serde_json::to_string_pretty(&table).map_err(UserError::failed)?);
             return Ok(());
         }
         print_table(&table);
         print_speed();
         Ok(())
     }
-}
-
-fn failed(error: impl std::fmt::Display) -> UserError {
-    UserError::Failed(error.to_string())
 }
 
 fn print_table(table: &LinkTable) {

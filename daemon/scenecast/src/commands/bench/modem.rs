@@ -25,7 +25,7 @@ impl ModemBench {
         let table = modem_table(self.seed, &mut |share| progress.show(share))?;
         drop(progress);
         if self.json {
-            let text = serde_json::to_string_pretty(&table).map_err(|e| UserError::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&table).map_err(UserError::failed)?;
             outln!("{text}");
         } else {
             print_table(&table);

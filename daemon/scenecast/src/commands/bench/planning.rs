@@ -62,7 +62,7 @@ impl PlanningBench {
         })?;
         drop(progress);
         if self.json {
-            outln!("{}", serde_json::to_string(&table).map_err(|e| UserError::Failed(e.to_string()))?);
+            outln!("{}", serde_json::to_string(&table).map_err(UserError::failed)?);
             return Ok(());
         }
         print_means(&table);
@@ -71,7 +71,7 @@ impl PlanningBench {
 
     fn paint(&self, trial: &Trial) -> Result<(), UserError> {
         let Some(dir) = &self.out else { return Ok(()) };
-        let png = plot(trial).map_err(|e| UserError::Failed(e.to_string()))?;
+        let png = plot(trial).map_err(UserError::failed)?;
         write_whole(&dir.join(format!("{}.png", trial.name)), &png)
     }
 }

@@ -65,7 +65,7 @@ impl MapBench {
         drop(progress);
         totals.finish();
         if self.json {
-            outln!("{}", serde_json::to_string(&totals).map_err(|e| UserError::Failed(e.to_string()))?);
+            outln!("{}", serde_json::to_string(&totals).map_err(UserError::failed)?);
         } else {
             totals.print();
         }

@@ -60,7 +60,7 @@ pub fn encode(coding: &Coding, base: &LabelRaster, target: &LabelRaster) -> Resu
 
 /// A coding error is wrong input: the files were read without error before.
 pub fn refused(error: ChunkFileError) -> UserError {
-    UserError::Input(error.to_string())
+    UserError::input(error)
 }
 
 /// Sizes of an encoded change, beside those of PNG files.

@@ -67,7 +67,7 @@ impl Sample {
             let world = sample(self.seed.wrapping_add(index), columns, rows, self.alpha, self.gamma, WORDS_PER_CELL);
             sheet.draw(&world, index as u32, &mut pixels);
         }
-        let png = encode(sheet.width, sheet.height, &pixels).map_err(|e| UserError::Failed(e.to_string()))?;
+        let png = encode(sheet.width, sheet.height, &pixels).map_err(UserError::failed)?;
         write_whole(&self.out, &png)
     }
 }

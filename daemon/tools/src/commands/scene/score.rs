@@ -154,7 +154,7 @@ fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<Sc
 }
 
 fn print_json(report: &impl Serialize) -> Result<(), UserError> {
-    outln!("{}", serde_json::to_string_pretty(report).map_err(|e| UserError::Failed(e.to_string()))?);
+    outln!("{}", serde_json::to_string_pretty(report).map_err(UserError::failed)?);
     Ok(())
 }
 

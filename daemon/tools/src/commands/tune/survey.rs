@@ -141,7 +141,7 @@ impl<'a> Survey<'a> {
         let annotations = Annotations::new(&site.classes, site.image.dimensions(), cell_px, site.ignore);
         Ok(Self {
             config,
-            annotations: annotations.map_err(|e| UserError::Input(e.to_string()))?,
+            annotations: annotations.map_err(UserError::input)?,
             colours: mosaic_classes(&site.image, cell_px),
             camera: DownCamera { metres_per_pixel: mpp, altitude_m: 0.0 },
             size,

@@ -76,14 +76,14 @@ impl<'a> Plot<'a> {
 
     pub fn svg(&self) -> Result<String, UserError> {
         let mut svg = String::new();
-        self.draw(SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT))).map_err(failed)?;
+        self.draw(SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT))).map_err(UserError::failed)?;
         Ok(svg)
     }
 
     pub fn png(&self) -> Result<Vec<u8>, UserError> {
         let mut raster = Raster::new(WIDTH, HEIGHT);
-        self.draw(&mut raster).map_err(failed)?;
-        raster.finish().map_err(failed)
+        self.draw(&mut raster).map_err(UserError::failed)?;
+        raster.finish().map_err(UserError::failed)
     }
 
     fn draw<Db: DrawingBackend>(&self, backend: Db) -> Drawn<Db> {
@@ -201,10 +201,6 @@ fn example<Db: DrawingBackend>(area: &Area<Db>, row: &Row, map: &RgbImage) -> Dr
         }
     }
     Ok(())
-}
-
-fn failed(error: impl std::fmt::Display) -> UserError {
-    UserError::Failed(error.to_string())
 }
 
 /// The range of an axis over all of the values; it starts at 0 unless they are close to each other.
