@@ -1,9 +1,10 @@
 //! The map in tiles for the page: which have changed since a reader's last request, and their bytes.
 
-use crate::export::{MapCells, Tiles};
-use crate::state::{MapIndex, TileLayer};
-use scenecast_protocol::map::{Quantity, REPLICA_TILE, ReplicaTile, ReplicaTileKey};
+use crate::bodies::{MapIndex, TileLayer};
+use scenecast_protocol::map::{Quantity, REPLICA_TILE, ReplicaTile, ReplicaTileKey, SharedTiles};
 use scenecast_protocol::time::Instant;
+use scenecast_surface::state::seconds;
+use scenecast_surface::{CellLayer, MapCells};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -21,7 +22,8 @@ pub(super) fn encode(index: &MapIndex, cells: &MapCells, keys: &[ReplicaTileKey]
     out.extend([FORMAT, 0, 0, 0]);
     out.extend((json.len() as u32).to_le_bytes());
     out.extend(json);
-    let layers: Vec<&Tiles> = std::iter::once(&cells.tiles).chain(cells.layers.iter().map(|l| &l.tiles)).collect();
+    let layers: Vec<&SharedTiles> =
+        std::iter::once(&cells.tiles).chain(cells.layers.iter().map(|l| &l.tiles)).collect();
     for key in keys {
         let at = out.len();
         out.extend([0; 4]);
@@ -98,7 +100,7 @@ impl TiledMap {
         let names = |cells: &MapCells| -> Vec<_> { cells.layers.iter().map(|l| l.descriptor.clone()).collect() };
         let is_continued = self.tiles.keys().all(|key| keys.contains(key)) && names(&self.cells) == names(&cells);
         let is_same = |key: &ReplicaTileKey| {
-            let same = |a: &Tiles, b: &Tiles| match (a.get(key), b.get(key)) {
+            let same = |a: &SharedTiles, b: &SharedTiles| match (a.get(key), b.get(key)) {
                 (Some(a), Some(b)) => Arc::ptr_eq(a, b),
                 (a, b) => a.is_none() && b.is_none(),
             };
@@ -147,7 +149,7 @@ impl TiledMap {
             tag: self.tag(),
             since: held.map(|revision| format!("{:08x}-{revision}", self.run)),
             version: cells.version,
-            at_s: crate::snapshot::seconds(cells.at),
+            at_s: seconds(cells.at),
             cell_m: cells.cell_m,
             x0: bounds.x,
             y0: bounds.y,
@@ -159,7 +161,7 @@ impl TiledMap {
     }
 }
 
-fn tile_layer(layer: &crate::export::CellLayer) -> TileLayer {
+fn tile_layer(layer: &CellLayer) -> TileLayer {
     let d = &layer.descriptor;
     TileLayer {
         name: d.name.clone().into_owned(),

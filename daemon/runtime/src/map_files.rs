@@ -1,11 +1,12 @@
 //! The operator's maps as files. They are made and written beside the loop of the link, which only hands over shared tiles.
 
-use scenecast_console::state::Origin;
-use scenecast_console::{MapCells, MapFormat};
+use scenecast_console::MapFormat;
 use scenecast_core::UserError;
 use scenecast_core::WGS84_AUX_XML;
 use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_files::write_whole;
+use scenecast_surface::MapCells;
+use scenecast_surface::state::Origin;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -105,7 +106,7 @@ fn write(dir: &Path, vehicle: u8, map: &MapFile) -> Result<(), UserError> {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(UserError::failed(e)),
         _ => Ok(()),
     };
-    let export = |format| map.cells.export(format, map.origin).map_err(UserError::failed);
+    let export = |format: MapFormat| format.export(&map.cells, map.origin).map_err(UserError::failed);
     if map.cells.bounds.is_some_and(|b| b.area() > MAX_CELLS) {
         put("tif", &export(MapFormat::Tiff)?)?;
         remove("pgw")?;

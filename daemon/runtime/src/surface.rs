@@ -12,18 +12,18 @@ use super::store::{ArchivedFile, SurfaceFiles};
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::report::report_reply;
-use scenecast_console::state::ReplaySide;
-use scenecast_console::{
-    ClientRequest, Console, LinkMeter, MapCaption, MissionFacts, PendingRequest, Reply, SurfaceRequest, archived_cells,
-    bind, former_labels, handle_request, measured_origin, snapshot, start,
-};
+use scenecast_console::{Console, PendingRequest, bind, start};
 use scenecast_core::{LatLon, TangentPlane, UserError, utc_text, world_file};
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::link::DropReason;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::position::Follow;
-use scenecast_surface::{CommandChange, SurfaceOutput};
+use scenecast_surface::state::ReplaySide;
+use scenecast_surface::{
+    ClientRequest, CommandChange, LinkMeter, MapCaption, MissionFacts, Reply, SurfaceOutput, SurfaceRequest,
+    archived_cells, former_labels, handle_request, measured_origin, snapshot,
+};
 use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex};

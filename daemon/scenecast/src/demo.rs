@@ -2,11 +2,7 @@
 
 use crate::mission_record::count;
 use scenecast_console::report::report_reply;
-use scenecast_console::state::{TrueClass, TruthInfo};
-use scenecast_console::{
-    ClientRequest, Console, LinkMeter, MissionFacts, Reply, SurfaceRequest, bind, former_labels, handle_request,
-    snapshot, start,
-};
+use scenecast_console::{Console, bind, start};
 use scenecast_core::palette::colour;
 use scenecast_core::{Area, UserError, errln, outln};
 use scenecast_protocol::time::Instant;
@@ -15,6 +11,10 @@ use scenecast_runtime::record::{SurfaceRecord, VehicleRecord, unix_nanos};
 use scenecast_runtime::{Stop, block_on, keep_private, random_bits};
 use scenecast_surface::record::EventTime;
 use scenecast_surface::recorder::Recorder;
+use scenecast_surface::state::{TrueClass, TruthInfo};
+use scenecast_surface::{
+    ClientRequest, LinkMeter, MissionFacts, Reply, SurfaceRequest, former_labels, handle_request, snapshot,
+};
 use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -87,7 +87,7 @@ fn make_truth(mission: &Mission) -> JoinHandle<Result<Option<Truth>, UserError>>
 }
 
 /// The true classes as the page shows them.
-fn shown(truth: Truth) -> scenecast_console::Truth {
+fn shown(truth: Truth) -> scenecast_surface::Truth {
     let Area { west, south, east, north } = truth.area;
     let class = |(value, name)| {
         let [red, green, blue] = colour(value);
@@ -95,7 +95,7 @@ fn shown(truth: Truth) -> scenecast_console::Truth {
     };
     let classes = truth.classes.into_iter().map(class).collect();
     let info = TruthInfo { west_m: west, south_m: south, east_m: east, north_m: north, classes };
-    scenecast_console::Truth { info, picture: truth.png.into() }
+    scenecast_surface::Truth { info, picture: truth.png.into() }
 }
 
 struct Demo {

@@ -1,11 +1,11 @@
 //! The records of both ends of a rehearsal in virtual time.
 
-use scenecast_console::{LinkMeter, MissionFacts, Snapshot, snapshot};
 use scenecast_core::UserError;
 use scenecast_files::{RecordEntry, RecordWriter};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{EndEvent, Mission};
 use scenecast_runtime::record::{IMAGES_INTERVAL_S, Stamps, SurfaceRecorder, VehicleRecorder, limits};
+use scenecast_surface::{LinkMeter, MissionFacts, Snapshot, snapshot};
 use std::path::Path;
 use std::time::Duration;
 

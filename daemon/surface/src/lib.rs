@@ -1,4 +1,7 @@
 //! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
+//!
+//! Whoever shows the surface to others publishes a [`Snapshot`] after each change, and hands it their requests by
+//! [`handle_request`] between two steps. Therefore no client can delay the link.
 
 mod annotations;
 mod assemble;
@@ -6,20 +9,29 @@ mod command;
 #[cfg(test)]
 mod command_tests;
 mod exemplar_cache;
+pub mod fit;
 mod in_force;
 mod label_book;
+mod layers;
+mod link_meter;
 mod log;
 mod logging;
+mod map_cells;
 mod map_in_view;
+pub mod messages;
 mod orders;
 pub mod position;
 pub mod record;
 pub mod recorder;
 mod refusal;
+mod request;
 mod send_orders;
-mod settings;
+mod settings_record;
+mod snapshot;
+pub mod state;
 mod surface;
 mod track;
+mod truth;
 mod vehicle_record;
 
 pub use annotations::{AnnotationRefusal, Annotations};
@@ -30,12 +42,23 @@ pub use command::{
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use label_book::LabelBook;
+pub use layers::cell_layers;
+pub use link_meter::LinkMeter;
 pub use log::{AUTOPILOT_SILENT, LogEntry, LogKind, MissionLog, NO_FAULT};
+pub use map_cells::{CellLayer, MapCaption, MapCells, tile_place};
 pub use map_in_view::LabelGains;
-pub use orders::{AreaOrder, AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, order_name};
+pub use orders::{
+    AgainOrder, AreaOrder, AreasOrder, BudgetOrder, CONSTRAINT_NAMES, CommandOrder, CommandOrderAction,
+    ConstraintsAction, ConstraintsOrder, DestinationOrder, DismissOrder, DraftOrder, ExemplarAction, ExemplarOrder,
+    FenceOrder, LabelOrder, LimitsOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder, RestoreOrder,
+    SettingsOrder, SharesOrder, TakeOverOrder, UtilityOrder, order_name,
+};
 pub use refusal::{OrderRefusal, Weighed};
+pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, former_labels, handle_request};
 pub use scenecast_core::{ClientName, Giver, Principal, Role};
-pub use settings::{SettingsOrder, SettingsRecord};
+pub use settings_record::SettingsRecord;
+pub use snapshot::{MissionFacts, Snapshot, measured_origin, principal_info, snapshot};
 pub use surface::{Surface, SurfaceOutput};
 pub use track::{RegistrationRecord, Track};
+pub use truth::Truth;
 pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord};

@@ -2,9 +2,8 @@
 
 use super::exemplar_cache::{ExemplarCache, RequestKind};
 use super::log::LogKind;
-use super::orders::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, hundredths};
+use super::orders::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, SettingsOrder, hundredths};
 use super::refusal::{OrderRefusal, Weighed};
-use super::settings::SettingsOrder;
 use super::{Surface, SurfaceOutput, VehicleRecord};
 use scenecast_protocol::directive::{Constraints, Fix, OrderStatus, Slot, SlotId, SlotProgress, Utility};
 use scenecast_protocol::link::IssueError;

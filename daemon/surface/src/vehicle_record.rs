@@ -6,7 +6,7 @@ use super::exemplar_cache::ExemplarCache;
 use super::label_book::LabelBook;
 use super::map_in_view::{Corrections, LabelGains};
 use super::record::{EarlierMap, StoredLabel};
-use super::settings::SettingsRecord;
+use super::settings_record::SettingsRecord;
 use super::track::{Pauses, RegistrationRecord, Track};
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};

@@ -3,9 +3,9 @@
 use super::constraints::{ask_of, ask_surface};
 use super::names;
 use super::session::Session;
-use crate::orders::{LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
-use crate::state::VehicleMarker;
 use scenecast_core::{UserError, one_line};
+use scenecast_surface::state::VehicleMarker;
+use scenecast_surface::{LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
 
 /// What is to be changed of a label; `None` stays as it is, an empty text is removed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

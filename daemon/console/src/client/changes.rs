@@ -3,8 +3,9 @@
 use super::names;
 use super::session::{Session, json, write};
 use super::text::{self, is_silent, mode, span};
-use crate::state::{ExemplarImage, ExemplarStage, LogLine, LogList, MissionState, VehicleState};
+use crate::bodies::{LogLine, LogList};
 use scenecast_core::{UserError, one_line};
+use scenecast_surface::state::{ExemplarImage, ExemplarStage, MissionState, VehicleState};
 use serde::Serialize;
 use std::path::Path;
 
@@ -208,7 +209,7 @@ fn line(entry: &LogLine) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::{CommandChangeName, CommandChangeState};
+    use scenecast_surface::state::{CommandChangeName, CommandChangeState};
 
     #[test]
     fn only_differences_are_changes() {

@@ -2,11 +2,10 @@
 
 use super::session::{Session, follow};
 use super::text;
-use crate::orders::{AgainOrder, ConstraintsOrder, RestoreOrder, TakeOverOrder};
-use crate::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
 use scenecast_core::{LatLon, TangentPlane, UserError};
 use scenecast_files::{CoordinateFrame, FenceShapes, read_fence};
-use scenecast_surface::{FenceOrder, LimitsOrder};
+use scenecast_surface::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
+use scenecast_surface::{AgainOrder, ConstraintsOrder, FenceOrder, LimitsOrder, RestoreOrder, TakeOverOrder};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::fmt::Write;

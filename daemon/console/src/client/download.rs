@@ -2,10 +2,10 @@
 
 use super::names;
 use super::session::{Session, follow};
-use crate::orders::{ExemplarAction, ExemplarOrder};
-use crate::state::{AcceptedOrder, ExemplarProgress, ExemplarStage, MissionState};
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
+use scenecast_surface::state::{AcceptedOrder, ExemplarProgress, ExemplarStage, MissionState};
+use scenecast_surface::{ExemplarAction, ExemplarOrder};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

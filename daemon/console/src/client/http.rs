@@ -1,12 +1,13 @@
 //! Requests over HTTP.
 
-use crate::state::{ErrorBody, MissionState};
+use crate::bodies::ErrorBody;
 use axum::body::Bytes;
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::Incoming;
 use hyper::{Method, Request, Response, StatusCode, Uri, header};
 use hyper_util::rt::TokioIo;
 use scenecast_core::{ClientName, UserError};
+use scenecast_surface::state::MissionState;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::time::Duration;

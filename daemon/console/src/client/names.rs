@@ -1,9 +1,9 @@
 //! Labels and vehicles as people name them: by number, or by name in any case.
 
-use crate::state::{MapLabel, MapLabelTree, MissionState, VehicleState};
 use scenecast_core::UserError;
 use scenecast_protocol::map::MAX_LABEL;
 use scenecast_surface::LabelBook;
+use scenecast_surface::state::{MapLabel, MapLabelTree, MissionState, VehicleState};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 

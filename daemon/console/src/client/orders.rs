@@ -4,11 +4,12 @@ use super::constraints::{OrderView, degrees, send, slot};
 use super::names;
 use super::session::{Session, follow};
 use super::text::{self, span};
-use crate::orders::{BudgetOrder, CommandOrder, SharesOrder, UtilityOrder};
-use crate::state::{CommandState, MissionState, PrincipalInfo};
 use scenecast_core::UserError;
 use scenecast_files::{AreaShape, CoordinateFrame, read_areas};
-use scenecast_surface::{AreaOrder, AreasOrder, DestinationOrder};
+use scenecast_surface::state::{CommandState, MissionState, PrincipalInfo};
+use scenecast_surface::{
+    AreaOrder, AreasOrder, BudgetOrder, CommandOrder, DestinationOrder, SharesOrder, UtilityOrder,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -217,7 +218,7 @@ fn view_text(state: &MissionState, you: &PrincipalInfo, client: &str) -> String 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::{CommandHolderState, PrincipalRole};
+    use scenecast_surface::state::{CommandHolderState, PrincipalRole};
 
     #[test]
     fn the_text_names_the_holder_and_the_possible_actions() {

@@ -3,8 +3,8 @@
 
 use super::http::Client;
 use super::{names, text};
-use crate::state::{AcceptedOrder, MissionState, OrderStatus, VehicleState};
 use scenecast_core::{UserError, printable};
+use scenecast_surface::state::{AcceptedOrder, MissionState, OrderStatus, VehicleState};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::time::Duration;

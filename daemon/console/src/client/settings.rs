@@ -2,11 +2,11 @@
 
 use super::session::{Session, follow};
 use super::text;
-use crate::fit::{Fit, FittedSettings};
-use crate::state::{MissionState, VehicleState};
 use scenecast_core::UserError;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerSet};
 use scenecast_surface::SettingsOrder;
+use scenecast_surface::fit::{Fit, FittedSettings};
+use scenecast_surface::state::{MissionState, VehicleState};
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SettingsChange {

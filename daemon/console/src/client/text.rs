@@ -1,7 +1,7 @@
 //! The state as text.
 
 use super::names::LabelGroup;
-use crate::state::{
+use scenecast_surface::state::{
     CommandChangeName, CommandChangeState, CommandState, ExemplarProgress, ExemplarStage, LinkSummary, MissionState,
     OrderProgress, OrderStatus, PrincipalRole, ReportedBacklog, ReportedDisk, ReportedMode, ReportedRegistration,
     ReportedTie, StatusReport, VehicleState,
@@ -284,7 +284,7 @@ pub(super) fn span(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::{PlannedPath, ReportedPose};
+    use scenecast_surface::state::{PlannedPath, ReportedPose};
 
     #[test]
     fn a_path_is_measured_from_the_vehicle_to_its_last_place() {

@@ -2,13 +2,14 @@
 
 use super::ExportError;
 use super::annotations::{coco, tag_lab};
-use super::cells::{ExploredCell, MapCaption, MapCells};
+use super::cells::{ExploredCell, explored};
 use super::geotiff::{Reference, geotiff};
 use super::projection::{TransverseMercator, well_known_text};
 use super::regions::{Polygon, regions};
-use crate::state::{Origin, VehicleMarker};
 use scenecast_core::label_picture;
 use scenecast_protocol::map::{Cell, LabelGrid, Quantity, Rect};
+use scenecast_surface::state::{Origin, VehicleMarker, seconds};
+use scenecast_surface::{MapCaption, MapCells};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -26,7 +27,7 @@ pub(super) fn check_picture(cells: &MapCells) -> Result<(), ExportError> {
 /// An indexed PNG, north up, pixel value = label. A PNG has no empty tiles, so its extent is limited.
 pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, ExportError> {
     check_picture(cells)?;
-    let grid: LabelGrid = cells.explored().map(|c| (c.cell, c.label)).collect();
+    let grid: LabelGrid = explored(cells).map(|c| (c.cell, c.label)).collect();
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
     Ok(label_picture::encode_coloured(&grid, bounds, |label| cells.book.class_colour(label))?)
 }
@@ -107,7 +108,7 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     let corners = corners.map(|(column, row)| side_of(cells.corner_m(column, row)));
     let is_across = corners.iter().any(|side| *side != corners[0]);
     let mut sides: BTreeMap<i64, Vec<(Cell, u8)>> = BTreeMap::new();
-    for cell in cells.explored() {
+    for cell in explored(cells) {
         let side = if is_across { side_of((cell.x, cell.y)) } else { corners[0] };
         sides.entry(side).or_default().push((cell.cell, cell.label));
     }
@@ -117,7 +118,7 @@ pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
             all.entry(label).or_default().extend(polygons.into_iter().map(|polygon| (side, polygon)));
         }
     }
-    let mut facts = json!({ "map_version": cells.version, "mission_time_s": crate::snapshot::seconds(cells.at) });
+    let mut facts = json!({ "map_version": cells.version, "mission_time_s": seconds(cells.at) });
     if let Some(caption) = &cells.caption {
         (facts["mission"], facts["epoch"]) = (caption.mission.as_str().into(), caption.epoch.into());
         (facts["vehicle"], facts["vehicle_name"]) = (caption.address.into(), caption.name.as_str().into());
@@ -163,7 +164,7 @@ pub(super) fn ply(cells: &MapCells, origin: Option<Origin>) -> String {
          property uchar blue\nproperty uchar label\nend_header\n"
     );
     let depth = cells.layers.iter().find(|l| l.descriptor.quantity == Quantity::Depth);
-    for ExploredCell { cell, x, y, label, .. } in cells.explored() {
+    for ExploredCell { cell, x, y, label, .. } in explored(cells) {
         let [red, green, blue] = cells.book.class_colour(label);
         let up = depth.and_then(|layer| layer.value(cell)).map_or(0.0, |depth| -depth);
         let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
@@ -184,7 +185,7 @@ pub(super) fn csv(cells: &MapCells, origin: Option<Origin>) -> String {
     out.push_str(if caption.is_some() { CAPTION_COLUMNS } else { "" });
     let projection = origin.map(TransverseMercator::about);
     out.push_str(if projection.is_some() { ",lat_deg,lon_deg" } else { "" });
-    for ExploredCell { cell, x, y, label, age_s } in cells.explored() {
+    for ExploredCell { cell, x, y, label, age_s } in explored(cells) {
         let age = age_s.map_or(String::new(), |age| age.to_string());
         let _ = write!(out, "\n{x:.3},{y:.3},{label},{age}");
         for layer in &cells.layers {
@@ -317,6 +318,29 @@ impl MapFormat {
         }
     }
 
+    /// A map as a file in this format; `origin` is the place of x = y = 0 of the world frame.
+    ///
+    /// # Errors
+    ///
+    /// The map is too large for the format, or the format needs an origin.
+    pub fn export(self, cells: &MapCells, origin: Option<Origin>) -> Result<Vec<u8>, ExportError> {
+        match self {
+            Self::Png => indexed_png(cells),
+            Self::WorldFile => Ok(world_file(cells).into()),
+            Self::Projection => Ok(companion(cells, Some(well_known_text(origin))).into()),
+            Self::TiffClasses | Self::UtmTiffClasses | Self::Wgs84TiffClasses => Ok(companion(cells, None).into()),
+            Self::Coco => coco(cells),
+            Self::TagLab => Ok(tag_lab(cells).into()),
+            Self::GeoJson => Ok(geojson(cells, origin).into()),
+            Self::Ply => Ok(ply(cells, origin).into()),
+            Self::Csv => Ok(csv(cells, origin).into()),
+            Self::Labels => Ok(labels(cells).into()),
+            Self::Tiff => geotiff(cells, origin, Reference::Mission),
+            Self::UtmTiff => geotiff(cells, origin, Reference::Utm),
+            Self::Wgs84Tiff => geotiff(cells, origin, Reference::Wgs84),
+        }
+    }
+
     pub(crate) const fn content_type(self) -> &'static str {
         match self {
             Self::Png => "image/png",
@@ -327,33 +351,6 @@ impl MapFormat {
             Self::Ply => "application/ply",
             Self::Csv | Self::Labels => "text/csv",
             Self::Tiff | Self::UtmTiff | Self::Wgs84Tiff => "image/tiff",
-        }
-    }
-}
-
-impl MapCells {
-    /// The map as a file; `origin` is the place of x = y = 0 of the world frame.
-    ///
-    /// # Errors
-    ///
-    /// The map is too large for the format, or the format needs an origin.
-    pub fn export(&self, format: MapFormat, origin: Option<Origin>) -> Result<Vec<u8>, ExportError> {
-        match format {
-            MapFormat::Png => indexed_png(self),
-            MapFormat::WorldFile => Ok(world_file(self).into()),
-            MapFormat::Projection => Ok(companion(self, Some(well_known_text(origin))).into()),
-            MapFormat::TiffClasses | MapFormat::UtmTiffClasses | MapFormat::Wgs84TiffClasses => {
-                Ok(companion(self, None).into())
-            }
-            MapFormat::Coco => coco(self),
-            MapFormat::TagLab => Ok(tag_lab(self).into()),
-            MapFormat::GeoJson => Ok(geojson(self, origin).into()),
-            MapFormat::Ply => Ok(ply(self, origin).into()),
-            MapFormat::Csv => Ok(csv(self, origin).into()),
-            MapFormat::Labels => Ok(labels(self).into()),
-            MapFormat::Tiff => geotiff(self, origin, Reference::Mission),
-            MapFormat::UtmTiff => geotiff(self, origin, Reference::Utm),
-            MapFormat::Wgs84Tiff => geotiff(self, origin, Reference::Wgs84),
         }
     }
 }

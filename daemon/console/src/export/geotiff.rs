@@ -4,14 +4,14 @@
 //! that the size of the file grows with the cells and not with their extent.
 
 use super::ExportError;
-use super::cells::{MapCaption, MapCells};
 use super::files::escaped;
 use super::projection::TransverseMercator;
 use super::tiff::Directory;
-use crate::state::Origin;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use scenecast_protocol::map::{Cell, REPLICA_TILE, Rect};
+use scenecast_surface::state::Origin;
+use scenecast_surface::{MapCaption, MapCells};
 use std::collections::BTreeSet;
 use std::io::Write;
 

@@ -11,8 +11,7 @@ mod tiff;
 use geotiff::{MAX_TILES, TILE};
 use scenecast_core::label_picture::{self, PictureError};
 
-pub(crate) use cells::Tiles;
-pub use cells::{CellLayer, MapCaption, MapCells};
+pub(crate) use cells::map_body;
 pub use files::MapFormat;
 pub(crate) use files::harmless;
 pub(crate) use projection::TransverseMercator;

@@ -1,6 +1,6 @@
 //! Between metres in the world frame, latitude and longitude, and UTM; the projection in well-known text.
 
-use crate::state::Origin;
+use scenecast_surface::state::Origin;
 
 /// Semi-major axis of WGS 84, metres.
 const A: f64 = 6_378_137.0;

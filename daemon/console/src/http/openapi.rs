@@ -2,9 +2,10 @@
 
 use super::handlers::maps::TILES;
 use super::operations::{Content, Operation, SchemaOf, operations};
-use crate::state::{ErrorBody, MapEvent, MapIndex, MissionState};
+use crate::bodies::{ErrorBody, MapEvent, MapIndex};
 use scenecast_protocol::map::MAX_LABEL;
 use scenecast_surface::LogKind;
+use scenecast_surface::state::MissionState;
 use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};

@@ -7,19 +7,19 @@ use super::handlers::maps::{self, MapQuery};
 use super::handlers::viewers::{self, VIEWERS};
 use super::handlers::{login, metrics, orders, readings};
 use super::shared::{Shared, VehicleId};
+use crate::bodies::{LogList, MapBody};
 use crate::export::MapFormat;
-use crate::fit::Fit;
-use crate::orders::{CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder};
 use crate::report::HTML;
-use crate::request::SurfaceRequest;
-use crate::state::{
-    AcceptedOrder, CellHistory, CommandState, LogList, MapBody, MissionState, PrincipalInfo, ReplayEventList,
-    ReplayOrder, ReplayState,
-};
 use axum::extract::{Query, State};
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
-use scenecast_surface::Role;
+use scenecast_surface::fit::Fit;
+use scenecast_surface::state::{
+    AcceptedOrder, CellHistory, CommandState, MissionState, PrincipalInfo, ReplayEventList, ReplayOrder, ReplayState,
+};
+use scenecast_surface::{
+    CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder, Role, SurfaceRequest,
+};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 /// Adds the schema of a type to a generator.

@@ -1,8 +1,8 @@
 //! Replies as HTTP responses, compressed for clients that accept gzip, or only status 304 for those that have the content; and
 //! the bodies of orders as JSON.
 
-use crate::request::Reply;
-use crate::state::{ArchiveList, ErrorBody};
+use crate::bodies::{ArchiveList, ErrorBody};
+use crate::export::map_body;
 use axum::Json;
 use axum::body::{Body, to_bytes};
 use axum::extract::{FromRequest, Request};
@@ -11,6 +11,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use scenecast_surface::Reply;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -22,7 +23,7 @@ use std::marker::PhantomData;
 /// The response to a handled request.
 pub(super) fn respond(reply: Reply) -> Response {
     match reply {
-        Reply::Map(cells) => match cells.body(None) {
+        Reply::Map(cells) => match map_body(&cells, None) {
             Ok(body) => Json(body).into_response(),
             Err(reason) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
         },

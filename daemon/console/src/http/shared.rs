@@ -2,8 +2,6 @@
 
 use super::access::{Access, EditRate, Seats};
 use super::response::{error, not_found, respond};
-use crate::request::{ClientRequest, Reply, SurfaceRequest};
-use crate::snapshot::Snapshot;
 use crate::tiles::TiledMap;
 use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Path};
@@ -11,7 +9,7 @@ use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use scenecast_protocol::map::Cell;
-use scenecast_surface::{Giver, OrderKind};
+use scenecast_surface::{ClientRequest, Giver, OrderKind, Reply, Snapshot, SurfaceRequest};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;

@@ -1,9 +1,9 @@
 //! The events of a record for its time line.
 
 use super::recording::Recording;
-use crate::state::ReplayEvent;
 use scenecast_messages::contents::valid_part;
 use scenecast_surface::LogKind;
+use scenecast_surface::state::ReplayEvent;
 use std::collections::BTreeMap;
 
 /// The most events of a time line; of more, the first.

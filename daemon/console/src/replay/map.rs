@@ -1,11 +1,10 @@
 //! The map of one end over the time of a record.
 
-use crate::export::MapCells;
-use crate::layers;
-use crate::state::FormerLabel;
 use scenecast_messages::scenecast_msgs;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerReplica, Rect, Replica, UNEXPLORED};
 use scenecast_protocol::time::Instant;
+use scenecast_surface::state::FormerLabel;
+use scenecast_surface::{MapCells, cell_layers};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The changes of a map, and the map after those up to one moment.
@@ -164,7 +163,7 @@ impl ShownMap {
             at,
             bounds: self.labels.bounds(),
             tiles: self.labels.tiles().clone(),
-            layers: layers::layers(&layers),
+            layers: cell_layers(&layers),
             ..MapCells::of_labels(&LabelGrid::default(), self.cell_m)
         }
     }
@@ -236,7 +235,7 @@ mod tests {
         history.take(20, change(true, 0, "confidence", &[(0, 4)]));
         let value = |history: &mut MapHistory, nanos| {
             history.seek(nanos, Instant::from_micros);
-            history.shown().cells(1, Instant::ZERO).layers().first().and_then(|layer| layer.value(Cell::new(0, 0)))
+            history.shown().cells(1, Instant::ZERO).layers.first().and_then(|layer| layer.value(Cell::new(0, 0)))
         };
         assert_eq!(value(&mut history, 20), Some(0.875));
         assert_eq!(value(&mut history, 10), None);

@@ -9,19 +9,16 @@ pub(crate) use map::ShownMap;
 pub use recording::Recording;
 pub(crate) use recording::{FrameCounts, Known, StateText};
 
-use crate::export::MapCells;
 use crate::report::{Dive, HTML};
-use crate::request::{ClientRequest, Reply, SurfaceRequest};
-use crate::snapshot::Snapshot;
-use crate::state::{
-    CellHistory, DifferingCells, MissionState, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState,
-    VehicleState,
-};
 use scenecast_messages::contents::{Stamps, valid_part};
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{LogEntry, LogKind};
+use scenecast_surface::state::{
+    CellHistory, DifferingCells, MissionState, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState,
+    VehicleState,
+};
+use scenecast_surface::{ClientRequest, LogEntry, LogKind, MapCells, Reply, Snapshot, SurfaceRequest};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::time::Duration;

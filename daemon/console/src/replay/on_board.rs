@@ -1,9 +1,9 @@
 //! What a vehicle knew, as the page shows it.
 
 use super::recording::Known;
-use crate::state::{MapLabel, PlannedPath, ReportedMode, ReportedPose, StatusReport, VehicleState};
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_protocol::wire::VehicleMode;
+use scenecast_surface::state::{MapLabel, PlannedPath, ReportedMode, ReportedPose, StatusReport, VehicleState};
 use std::collections::BTreeMap;
 
 /// Places of a track at most, and seconds between two of them.

@@ -1,7 +1,7 @@
 //! The records of both ends of a mission, on the clock of the surface.
 
 use super::map::MapHistory;
-use crate::messages::layer_of_text;
+use crate::layer_text::layer_of_text;
 use scenecast_core::UserError;
 use scenecast_files::{
     FrameTimes, MissionClock, MissionSpeed, RecordedMessage, StateTime, mission_records, read_record,

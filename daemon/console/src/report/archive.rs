@@ -5,10 +5,10 @@ use super::orders::OrderStep;
 use super::track::TrackPoint;
 use super::words;
 use crate::export::{MapFormat, harmless};
-use crate::state::VehicleState;
 use scenecast_core::{UserError, utc_text};
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::Event;
+use scenecast_surface::state::VehicleState;
 use std::fmt::Display;
 use std::io::{Cursor, Write};
 use zip::ZipWriter;
@@ -72,7 +72,7 @@ impl Dive {
             |format: &MapFormat| matches!(format, MapFormat::UtmTiffClasses | MapFormat::Wgs84TiffClasses);
         for format in MapFormat::ALL.into_iter().filter(|format| has_origin || !is_on_earth(format)) {
             // A mission without an origin has no place for some formats.
-            if let Ok(bytes) = cells.export(format, self.state.mission.origin) {
+            if let Ok(bytes) = format.export(&cells, self.state.mission.origin) {
                 archive.add(&format!("{folder}/map.{}", format.extension()), &bytes)?;
             }
         }

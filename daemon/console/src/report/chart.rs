@@ -3,9 +3,9 @@
 use super::Escaped;
 use super::dive::DiveVehicle;
 use super::track::TrackPoint;
-use crate::state::VehicleState;
 use scenecast_core::{Area, utc_text};
 use scenecast_protocol::map::Rect;
+use scenecast_surface::state::VehicleState;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -10,9 +10,7 @@ use super::settings::SettingsRecord;
 use super::times::is_scaled;
 use super::track::{TrackPoint, measured};
 use super::words;
-use crate::export::{MapCaption, MapCells};
 use crate::replay::{FrameCounts, Recording, StateText};
-use crate::state::{LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState};
 use scenecast_core::{UserError, utc_text};
 use scenecast_files::{MissionClock, RecordFile};
 use scenecast_messages::contents::valid_part;
@@ -20,6 +18,10 @@ use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Link, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_surface::state::{
+    LinkDirection, LinkSummary, MapLabelTree, MissionState, ReplaySide, VehicleMarker, VehicleState,
+};
+use scenecast_surface::{MapCaption, MapCells};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 

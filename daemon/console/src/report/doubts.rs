@@ -2,9 +2,9 @@
 
 use super::dive::{Dive, DiveVehicle};
 use super::{extent, gaps, words};
-use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_files::HOW_TO_RECOVER;
+use scenecast_surface::state::VehicleState;
 
 /// A place with a greater standard deviation is worth a sentence, metres.
 const DOUBTFUL_M: f64 = 5.0;

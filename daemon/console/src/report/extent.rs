@@ -2,9 +2,9 @@
 
 use super::dive::{Dive, DiveVehicle};
 use super::words::{self, lat_lon};
-use crate::state::VehicleState;
 use scenecast_core::{Area, fence_of, place_of};
 use scenecast_protocol::map::{Cell, Quantity, UNEXPLORED};
+use scenecast_surface::state::VehicleState;
 use std::ops::RangeInclusive;
 
 /// The limits of the operator's map in words, in metres and, with an origin, in degrees; `None` while it has no cells.
@@ -30,7 +30,7 @@ pub(super) fn of_map(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
 /// How deep the sea floor is, where the map has a layer of it.
 pub(super) fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let cells = dive.map_cells(state, vehicle);
-    let layer = cells.layers().iter().find(|layer| layer.descriptor().quantity == Quantity::Depth)?;
+    let layer = cells.layers.iter().find(|layer| layer.descriptor.quantity == Quantity::Depth)?;
     let depths: Vec<f64> = vehicle.labels.iter().filter_map(|(cell, _)| layer.value(cell)).collect();
     let median = words::median(&depths)?;
     let (least, most) = depths.iter().fold((median, median), |(least, most), m| (least.min(*m), most.max(*m)));

@@ -5,9 +5,9 @@ use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
 use super::words::{self, counted};
 use crate::replay::FrameCounts;
-use crate::state::{LinkDirection, LinkSummary, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Link;
+use scenecast_surface::state::{LinkDirection, LinkSummary, VehicleState};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -2,9 +2,9 @@
 
 use super::dive::seconds;
 use crate::replay::{Known, Recording, ShownMap};
-use crate::state::VehicleChannel;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
+use scenecast_surface::state::VehicleChannel;
 
 /// Moments of a record at which its maps are looked at.
 const MOMENTS: u64 = 60;

@@ -22,7 +22,7 @@ mod words;
 
 pub use dive::Dive;
 
-use crate::request::Reply;
+use scenecast_surface::Reply;
 use std::path::PathBuf;
 
 /// The content type of a report.

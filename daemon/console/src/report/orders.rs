@@ -2,10 +2,10 @@
 
 use super::dive::{Dive, DiveVehicle};
 use super::{Escaped, words};
-use crate::state::{InForceKnowledge, VehicleState};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::OrderStatus;
 use scenecast_protocol::directive::SlotId;
+use scenecast_surface::state::{InForceKnowledge, VehicleState};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;

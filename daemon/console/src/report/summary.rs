@@ -5,13 +5,13 @@ use super::maps::MapsAt;
 use super::orders::OrderStep;
 use super::words::{self, area, counted, interval, on_earth};
 use super::{extent, gaps, trouble};
-use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::directive::{PlannerKind, SlotId};
 use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
 use scenecast_surface::LogKind;
+use scenecast_surface::state::VehicleState;
 use serde_json::Value;
 use std::collections::BTreeMap;
 

@@ -3,11 +3,11 @@
 use super::dive::{Dive, DiveVehicle};
 use super::restart::SetBack;
 use super::{gaps, words};
-use crate::state::VehicleState;
 use scenecast_core::utc_text;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::wire::{EquipmentFaults, ModeReason, VehicleMode};
+use scenecast_surface::state::VehicleState;
 use scenecast_surface::{AUTOPILOT_SILENT, LogKind, NO_FAULT};
 use std::collections::BTreeSet;
 

@@ -1,8 +1,8 @@
 //! The health of a vehicle and of its link.
 
-use scenecast_console::state::{OrderStatus, ReportedMode, VehicleState};
 use scenecast_messages::contents::Health;
 use scenecast_messages::diagnostic_msgs::DiagnosticStatus;
+use scenecast_surface::state::{OrderStatus, ReportedMode, VehicleState};
 
 /// A vehicle is silent after this many of its usual pauses between two frames, as on the page.
 const SILENT_PAUSES: f64 = 3.0;

@@ -3,15 +3,15 @@
 use super::Desk;
 use crate::node::{Publisher, RosNode};
 use crate::transport::Qos;
-use scenecast_console::messages::grid;
-use scenecast_console::state::VehicleState;
-use scenecast_console::{ClientRequest, Reply, SurfaceRequest};
 use scenecast_core::{UserError, palette};
 use scenecast_messages::contents::{MAX_GRID_CELLS, cloud, layers, occupancy};
 use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::OccupancyGrid;
 use scenecast_messages::sensor_msgs::PointCloud2;
 use scenecast_messages::std_msgs::Header;
+use scenecast_surface::messages::grid;
+use scenecast_surface::state::VehicleState;
+use scenecast_surface::{ClientRequest, Reply, SurfaceRequest};
 use std::time::{Duration, Instant};
 
 /// Minimum time between two maps.

@@ -11,9 +11,9 @@ mod vehicle;
 use crate::node::RosNode;
 use crate::stop::{self, Owned, Owner};
 use scenecast_config::Ros2;
-use scenecast_console::{ClientRequest, PendingRequest, Reply, Snapshot};
 use scenecast_core::{ClientName, Giver, Principal, UserError};
 use scenecast_messages::contents::Stamps;
+use scenecast_surface::{ClientRequest, Reply, Snapshot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -28,6 +28,9 @@ fn nanos(time: SystemTime) -> i64 {
 const TICK: Duration = Duration::from_millis(100);
 /// Requests that may wait for the surface.
 const MAX_PENDING: usize = 4;
+
+/// A request, and the place for its reply.
+type PendingRequest = (ClientRequest, oneshot::Sender<Reply>);
 
 /// The host's end of ROS 2 at the surface, of the same form as the console's.
 #[derive(Debug)]

@@ -4,15 +4,14 @@ use super::{Desk, nanos};
 use crate::inbox::Inbox;
 use crate::node::RosNode;
 use crate::transport::Qos;
-use scenecast_console::state::VehicleState;
-use scenecast_console::{ClientRequest, OrderChanges, Reply, SurfaceRequest};
 use scenecast_core::{Giver, UserError};
 use scenecast_messages::contents::WORLD_FRAME;
 use scenecast_messages::geometry_msgs::Polygon;
 use scenecast_messages::scenecast_msgs::{Abort, Event, Fence, Hold, Utility};
 use scenecast_messages::std_msgs::Header;
 use scenecast_protocol::directive::Constraints;
-use scenecast_surface::FenceOrder;
+use scenecast_surface::state::VehicleState;
+use scenecast_surface::{ClientRequest, FenceOrder, OrderChanges, Reply, SurfaceRequest};
 use std::time::SystemTime;
 
 /// Orders of a kind that wait at most.

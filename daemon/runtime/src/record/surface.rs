@@ -6,9 +6,7 @@ use super::{
 };
 use bytes::Bytes;
 use scenecast_config::Config;
-use scenecast_console::Snapshot;
-use scenecast_console::messages::{label_tree, layer_text, link, order, order_status, place, place_on_earth};
-use scenecast_console::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
+use scenecast_console::layer_text;
 use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
 use scenecast_messages::Message;
@@ -18,7 +16,9 @@ use scenecast_messages::scenecast_msgs::{Event, Exemplar};
 use scenecast_messages::std_msgs::Text;
 use scenecast_protocol::map::{LayerDescriptor, StateReplica};
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{LogKind, Surface};
+use scenecast_surface::messages::{label_tree, link, order, order_status, place, place_on_earth};
+use scenecast_surface::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
+use scenecast_surface::{LogKind, Snapshot, Surface};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

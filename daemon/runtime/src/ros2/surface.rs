@@ -1,8 +1,9 @@
 //! The surface's end.
 
 use scenecast_config::Config;
-use scenecast_console::{PendingRequest, Snapshot};
+use scenecast_console::PendingRequest;
 use scenecast_core::{Principal, Role, UserError};
+use scenecast_surface::Snapshot;
 use std::sync::Arc;
 
 /// ROS 2 at the surface, if it is switched on.

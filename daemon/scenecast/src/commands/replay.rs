@@ -1,9 +1,10 @@
 //! `scenecast replay`
 
 use clap::Args;
-use scenecast_console::{Console, Recording, Replay as Player, Reply, bind, start};
+use scenecast_console::{Console, Recording, Replay as Player, bind, start};
 use scenecast_core::{UserError, errln, outln};
 use scenecast_runtime::{Stop, block_on, keep_private};
+use scenecast_surface::Reply;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -2,7 +2,7 @@
 
 use crate::exemplar_cache::{OpenRequest, RequestState, StoredExemplar};
 use crate::record::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredPlaces, StoredRange, StoredRequest};
-use crate::settings::SettingsRecord;
+use crate::settings_record::SettingsRecord;
 use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::directive::{
     Areas, Destination, ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress,

@@ -3,9 +3,9 @@
 use super::ends::{Disk, End, Ends, MoreSettings, Stop, failed};
 use super::page::{Page, is_decided};
 use crate::process::free_port;
-use scenecast_console::state::{OrderStatus, ReportedMode, VehicleState};
 use scenecast_core::UserError;
 use scenecast_surface::LimitsOrder;
+use scenecast_surface::state::{OrderStatus, ReportedMode, VehicleState};
 use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -1,8 +1,8 @@
 //! The operator's page of a run: what it shows, and the orders of its operator.
 
 use scenecast_console::client::{Client, block_on};
-use scenecast_console::state::{MissionState, OrderStatus, VehicleState};
 use scenecast_core::{ClientName, UserError};
+use scenecast_surface::state::{MissionState, OrderStatus, VehicleState};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::thread::sleep;

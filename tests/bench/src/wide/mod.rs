@@ -7,12 +7,12 @@ pub(crate) use command::WideBench;
 
 use crate::cpu_meter::{CpuMeter, resident_bytes};
 use scenecast_config::Config;
-use scenecast_console::state::Origin;
-use scenecast_console::{
-    ClientRequest, LinkMeter, MapCells, MapFormat, MissionFacts, Reply, SurfaceRequest, TiledMap, gzip, handle_request,
-    page_files, snapshot,
-};
+use scenecast_console::{MapFormat, TiledMap, gzip, page_files};
 use scenecast_core::UserError;
+use scenecast_surface::state::Origin;
+use scenecast_surface::{
+    ClientRequest, LinkMeter, MapCells, MissionFacts, Reply, SurfaceRequest, handle_request, snapshot,
+};
 use serde::Serialize;
 use std::time::Duration;
 use survey::WideSurvey;
@@ -172,7 +172,7 @@ fn cells(survey: &mut WideSurvey, cell_m: f64) -> Result<MapCells, UserError> {
 
 fn export(cells: &MapCells, format: MapFormat, keep: &mut Keep<'_>) -> Result<ExportCost, UserError> {
     let meter = CpuMeter::start();
-    let made = cells.export(format, Some(ORIGIN));
+    let made = format.export(cells, Some(ORIGIN));
     let cpu_ms = meter.ms();
     let bytes = made.as_ref().map_or(0, Vec::len);
     if let Ok(bytes) = &made {

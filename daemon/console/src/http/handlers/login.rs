@@ -4,13 +4,12 @@ use crate::http::access::{COOKIE, PeerAddress};
 use crate::http::response::{error, not_found};
 use crate::http::server;
 use crate::http::shared::Shared;
-use crate::snapshot::principal_info;
 use axum::extract::State;
 use axum::extract::rejection::FormRejection;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 use axum::{Extension, Form, Json};
-use scenecast_surface::Giver;
+use scenecast_surface::{Giver, principal_info};
 use serde::Deserialize;
 use zeroize::Zeroizing;
 

@@ -2,12 +2,9 @@
 //! link.
 
 use super::readings::utc_at;
-use crate::export::{MapCaption, MapCells, MapFormat};
+use crate::export::{MapFormat, map_body};
 use crate::http::response::{accepts_gzip, error, gzip, respond, tagged};
 use crate::http::shared::{CachedMap, MapCell, Shared, VehicleId};
-use crate::request::{Reply, SurfaceRequest};
-use crate::snapshot::seconds;
-use crate::state::{MapLabelTree, ReplaySide, VehicleMarker};
 use crate::tiles::TiledMap;
 use axum::Json;
 use axum::body::Bytes;
@@ -15,6 +12,8 @@ use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use scenecast_protocol::map::{LabelTree, MAX_LABEL, Rect};
+use scenecast_surface::state::{MapLabelTree, ReplaySide, VehicleMarker, seconds};
+use scenecast_surface::{MapCaption, MapCells, Reply, SurfaceRequest};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -71,7 +70,7 @@ pub(in crate::http) async fn map(
     if is_held(&headers, &tag) {
         return tagged(&headers, &tag, || StatusCode::OK.into_response());
     }
-    let made = tokio::task::spawn_blocking(move || cached.map.cells().body(region)).await;
+    let made = tokio::task::spawn_blocking(move || map_body(cached.map.cells(), region)).await;
     match made {
         Ok(Ok(body)) => tagged(&headers, &tag, || Json(body).into_response()),
         Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, reason),
@@ -224,7 +223,7 @@ pub(in crate::http) async fn file(
     };
     let made = tokio::task::spawn_blocking(move || {
         let cells = MapCells { moved_m, book, tree, markers, caption, ..cached.map.cells().clone() };
-        cut_at(count, cells).export(format, origin)
+        format.export(&cut_at(count, cells), origin)
     });
     match made.await {
         Ok(Ok(bytes)) => {
@@ -255,7 +254,7 @@ pub(in crate::http) async fn archived(shared: Shared, name: String, query: MapQu
     let Ok(_maker) = shared.maps.makers.acquire().await else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
-    match tokio::task::spawn_blocking(move || cut_at(count, cells).export(format, origin)).await {
+    match tokio::task::spawn_blocking(move || format.export(&cut_at(count, cells), origin)).await {
         Ok(Ok(bytes)) => ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response(),
         Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, reason),
         Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),

@@ -4,10 +4,10 @@
 //! descriptions.
 
 use crate::http::shared::Shared;
-use crate::state::{ChannelQuality, LinkDirection, MissionState, OrderStatus, VehicleState};
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
+use scenecast_surface::state::{ChannelQuality, LinkDirection, MissionState, OrderStatus, VehicleState};
 use std::fmt::Write;
 
 pub(in crate::http) const CONTENT_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";

@@ -2,18 +2,16 @@
 
 use crate::http::response::{JsonOrder, error};
 use crate::http::shared::{Shared, VehicleId};
-use crate::orders::{
-    AgainOrder, BudgetOrder, CONSTRAINTS, CommandOrder, CommandOrderAction, DraftOrder, MarkerOrder, NoteOrder,
-    UtilityOrder,
-};
-use crate::request::SurfaceRequest;
 use axum::Extension;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
 use axum::routing::{MethodRouter, post};
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::{CommandAction, Giver};
+use scenecast_surface::{
+    AgainOrder, BudgetOrder, CONSTRAINT_NAMES, CommandAction, CommandOrder, CommandOrderAction, DraftOrder, Giver,
+    MarkerOrder, NoteOrder, SurfaceRequest, UtilityOrder,
+};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 
@@ -90,9 +88,9 @@ pub(in crate::http) async fn again(
     JsonOrder(AgainOrder { slot }): JsonOrder<AgainOrder>,
 ) -> Response {
     // Hold, resume and abort share a slot.
-    let of_constraints = CONSTRAINTS.contains(&slot.as_str()).then_some(SlotId::Constraints);
+    let of_constraints = CONSTRAINT_NAMES.contains(&slot.as_str()).then_some(SlotId::Constraints);
     let Some(found) = of_constraints.or_else(|| SlotId::ALL.into_iter().find(|id| id.name() == slot)) else {
-        let names: Vec<&str> = SlotId::ALL.map(SlotId::name).into_iter().chain(CONSTRAINTS).collect();
+        let names: Vec<&str> = SlotId::ALL.map(SlotId::name).into_iter().chain(CONSTRAINT_NAMES).collect();
         return error(StatusCode::UNPROCESSABLE_ENTITY, format!("slot {slot:?}: it takes {}", names.join(", ")));
     };
     shared.order(by, SurfaceRequest::Again(id, found, slot)).await

@@ -1,13 +1,11 @@
 //! Readings: the state and its changes as server-sent events, exemplars, fitting settings, the log of the mission.
 
+use crate::bodies::{LogLine, LogList, MapEvent};
 use crate::export::harmless;
 use crate::http::access::{MAX_STREAMS, Seat};
 use crate::http::connections::EVENT_STREAM;
 use crate::http::response::{JsonOrder, error, not_found, respond};
 use crate::http::shared::{Shared, VehicleId};
-use crate::request::{Reply, SurfaceRequest};
-use crate::snapshot::{Snapshot, seconds};
-use crate::state::{LogLine, LogList, MapEvent, ReplayOrder};
 use axum::body::{Body, Bytes};
 use axum::extract::{Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, Uri, header};
@@ -15,7 +13,8 @@ use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use scenecast_core::utc_text;
 use scenecast_messages::contents::Stamps;
-use scenecast_surface::{Giver, LogEntry, LogKind};
+use scenecast_surface::state::{ReplayOrder, seconds};
+use scenecast_surface::{Giver, LogEntry, LogKind, Reply, Snapshot, SurfaceRequest};
 use serde::Deserialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::convert::Infallible;

@@ -1,10 +1,10 @@
 //! The operations on archived maps.
 
 use super::{Content, Operation, read, schema};
+use crate::bodies::ArchiveList;
 use crate::export::MapFormat;
 use crate::http::handlers::maps::{self, MapQuery};
 use crate::http::shared::{ArchiveName, Shared};
-use crate::state::ArchiveList;
 use axum::extract::{Query, State};
 use axum::routing::get;
 

@@ -2,12 +2,11 @@
 
 use super::{Operation, change, order, schema};
 use crate::http::handlers::orders as handlers;
-use crate::orders::{
-    AgainOrder, BudgetOrder, ConstraintsOrder, ExemplarOrder, RestoreOrder, TakeOverOrder, UtilityOrder,
-};
-use crate::request::SurfaceRequest;
 use axum::routing::post;
-use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder, LimitsOrder, Role, SettingsOrder};
+use scenecast_surface::{
+    AgainOrder, AreasOrder, BudgetOrder, ConstraintsOrder, DestinationOrder, ExemplarOrder, FenceOrder, LimitsOrder,
+    RestoreOrder, Role, SettingsOrder, SurfaceRequest, TakeOverOrder, UtilityOrder,
+};
 
 /// The operations that give a vehicle orders.
 pub(super) fn operations() -> Vec<Operation> {

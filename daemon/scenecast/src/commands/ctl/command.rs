@@ -2,8 +2,8 @@
 
 use clap::Subcommand;
 use scenecast_console::client::{self, Session};
-use scenecast_console::orders::{CommandOrder, CommandOrderAction};
 use scenecast_core::UserError;
+use scenecast_surface::{CommandOrder, CommandOrderAction};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CommandChange {

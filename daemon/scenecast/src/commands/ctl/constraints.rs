@@ -2,9 +2,8 @@
 
 use clap::{Args, Subcommand};
 use scenecast_console::client::{self, FenceFile, LIMITS, Session};
-use scenecast_console::orders::{ConstraintsAction, ConstraintsOrder};
 use scenecast_core::UserError;
-use scenecast_surface::LimitsOrder;
+use scenecast_surface::{ConstraintsAction, ConstraintsOrder, LimitsOrder};
 use std::path::PathBuf;
 
 const FILE: &str = "\

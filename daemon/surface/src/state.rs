@@ -1,4 +1,4 @@
-//! The types of the API's replies, from which the OpenAPI document is made.
+//! The state of the surface as others see it: the types of what the API replies, from which the OpenAPI document is made.
 
 mod command;
 mod labels;
@@ -14,20 +14,24 @@ pub use command::{
 };
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel, MapLabelTree};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
-pub use map::{
-    CellHistory, EarlierMap, FormerLabel, LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer,
-};
+pub use map::{CellHistory, EarlierMap, FormerLabel, MapPlacement, MapSummary};
 pub use replay::{DifferingCells, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState};
-pub use storage::{ArchiveList, ArchivedMap, LogLine, LogList, StorageInfo, VehicleMarker, VehicleNote};
+pub use storage::{ArchivedMap, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, InForceKnowledge, OrderProgress, OrderStatus, OtherSurface, PlannedPath,
     ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport,
     UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
 };
 
+use scenecast_protocol::time::Instant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Mission time in the API, rounded to a hundredth of a second.
+pub fn seconds(at: Instant) -> f64 {
+    (at.as_secs_f64() * 100.0).round() / 100.0
+}
 
 /// Everything that the page shows, except maps and images. A member that ends in `_s` is a mission time in seconds,
 /// unless it is called a duration.
@@ -168,11 +172,4 @@ pub struct AcceptedOrder {
     pub version: Option<u16>,
     /// Its version at each vehicle that it goes to, by address.
     pub versions: BTreeMap<u8, u16>,
-}
-
-/// The reason why a request failed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct ErrorBody {
-    /// The reason in one line, for people.
-    pub error: String,
 }

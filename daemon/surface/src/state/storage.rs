@@ -1,4 +1,4 @@
-//! The files of the surface: the state of their disk, archived maps, markers, notes, and the log of the mission.
+//! The files of the surface: the state of their disk, archived maps, markers and notes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -36,13 +36,6 @@ pub struct ArchivedMap {
     pub ended_s: f64,
 }
 
-/// The maps of runs and label epochs that have ended.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct ArchiveList {
-    /// The archived maps, the newest first.
-    pub maps: Vec<ArchivedMap>,
-}
-
 /// A marker on a vehicle's map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct VehicleMarker {
@@ -68,31 +61,5 @@ pub struct VehicleNote {
     /// The name of the person or program that wrote it.
     pub author: String,
     /// The text of the note, as written.
-    pub text: String,
-}
-
-/// The log of the mission: its last 2000 entries at most.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct LogList {
-    /// The entries, the oldest first.
-    pub entries: Vec<LogLine>,
-}
-
-/// An entry of the log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct LogLine {
-    /// One more than that of the entry before.
-    pub number: u64,
-    /// Mission time.
-    pub at_s: f64,
-    /// The same time in UTC by the clock of the surface's computer (RFC 3339).
-    pub utc: String,
-    /// The address of the vehicle; null if the entry concerns the surface or all vehicles.
-    pub vehicle: Option<u8>,
-    /// order, answer, contact, mode, label, image, record, command, fault or refused.
-    pub kind: String,
-    /// The principal who caused it; null for the surface and the vehicle.
-    pub by: Option<String>,
-    /// One line for people.
     pub text: String,
 }

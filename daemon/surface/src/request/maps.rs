@@ -1,15 +1,14 @@
 //! Maps of vehicles, of the present and of earlier runs.
 
 use super::Reply;
-use crate::export::{MapCaption, MapCells};
-use crate::layers;
-use crate::snapshot::seconds;
-use crate::state::{CellHistory, FormerLabel};
+use crate::Surface;
+use crate::layers::cell_layers;
+use crate::map_cells::{MapCaption, MapCells};
+use crate::record::VehicleMemory;
+use crate::state::{CellHistory, FormerLabel, seconds};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::Surface;
-use scenecast_surface::record::VehicleMemory;
 
 /// The labels that a cell had before, of what the surface has kept about the vehicle.
 pub fn former_labels(kept: Option<&VehicleMemory>, cell: Cell) -> Reply {
@@ -32,7 +31,7 @@ pub fn archived_cells(map: &VehicleMemory, cell_m: f64, caption: Option<MapCapti
         markers: map.markers().map(|marker| (crate::snapshot::marker(marker), None)).collect(),
         caption,
         tiles: labels.tiles().clone(),
-        layers: layers::layers(&layers),
+        layers: cell_layers(&layers),
     }
 }
 
@@ -47,11 +46,11 @@ pub(super) fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant
         bounds: surface.map_bounds(vehicle),
         cell_m,
         moved_m: (0.0, 0.0),
-        book: scenecast_surface::LabelBook::default(),
+        book: crate::LabelBook::default(),
         tree: None,
         markers: Vec::new(),
         caption: None,
         tiles: surface.map_tiles(vehicle)?,
-        layers: layers::layers(&surface.map_layers(vehicle)),
+        layers: cell_layers(&surface.map_layers(vehicle)),
     }))
 }

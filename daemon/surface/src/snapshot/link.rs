@@ -1,14 +1,14 @@
 //! The acoustic link: budget, rates, losses, backlogs.
 
-use super::facts::{MissionFacts, seconds};
+use super::facts::MissionFacts;
+use crate::Surface;
 use crate::link_meter::LinkMeter;
-use crate::state::{ChannelQuality, LinkDirection, LinkSummary, ReportedBacklog, VehicleChannel};
+use crate::state::{ChannelQuality, LinkDirection, LinkSummary, ReportedBacklog, VehicleChannel, seconds};
 use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::time::{ClockMap, Instant};
 use scenecast_protocol::wire::{Backlog, Stamp};
-use scenecast_surface::Surface;
 use std::collections::BTreeMap;
 
 /// The link to all vehicles together.

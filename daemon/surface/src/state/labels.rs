@@ -1,7 +1,7 @@
 //! The labels of a map and their exemplars.
 
+use crate::record::StoredLabel;
 use scenecast_protocol::map::LabelTree;
-use scenecast_surface::record::StoredLabel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,11 +39,13 @@ pub struct MapLabelTree {
 }
 
 impl MapLabelTree {
-    pub(crate) fn of(tree: &LabelTree) -> Self {
+    /// The tree of a vehicle, as the API has it.
+    pub fn of(tree: &LabelTree) -> Self {
         Self { merges: tree.merges().to_vec(), clearest: tree.clearest() }
     }
 
-    pub(crate) fn tree(&self) -> Option<LabelTree> {
+    /// The same tree; `None` if it is none.
+    pub fn tree(&self) -> Option<LabelTree> {
         LabelTree::new(self.merges.clone(), self.clearest)
     }
 }

@@ -2,9 +2,9 @@
 
 use super::SurfaceRequest;
 use crate::orders::{ExemplarAction, LabelOrder, OrderChanges};
+use crate::{LimitsOrder, LogKind};
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{LimitsOrder, LogKind};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -116,7 +116,7 @@ fn members(order: &impl serde::Serialize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_surface::{DestinationOrder, LimitsOrder};
+    use crate::{DestinationOrder, LimitsOrder};
 
     #[test]
     fn requests_are_described_by_what_they_change() {

@@ -1,20 +1,20 @@
 //! Vehicles as the surface knows them.
 
-use super::facts::{MissionFacts, seconds};
+use super::facts::MissionFacts;
 use super::{exemplar, facts, link};
+use crate::record::{StoredDraft, StoredMarker, StoredNote};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapLabelTree, MapSummary, OrderProgress,
     OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedPose, ReportedRegistration,
     ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders,
-    VehicleSettings, VehicleState, WeightDraft,
+    VehicleSettings, VehicleState, WeightDraft, seconds,
 };
+use crate::{SettingsOrder, Surface, Track, VehicleRecord, order_name};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotId, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleStatus};
-use scenecast_surface::record::{StoredDraft, StoredMarker, StoredNote};
-use scenecast_surface::{SettingsOrder, Surface, Track, VehicleRecord, order_name};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
     let all = surface.vehicles();

@@ -1,8 +1,9 @@
 //! Settings of the scene model that fit a budget.
 
+use super::orders::SettingsOrder;
+use super::surface::Surface;
 use scenecast_core::tuning_table::{self, NoRow, Row};
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{SettingsOrder, Surface};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

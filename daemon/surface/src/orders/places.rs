@@ -1,11 +1,9 @@
 //! Fences, limits, weighted areas and destinations as the operator types them.
 
-use super::refusal::{OrderRefusal, Weighed};
+use crate::refusal::{OrderRefusal, Weighed};
 use scenecast_core::{fence_of, outline_of, place_of};
 use scenecast_protocol::coordinates::DecimetrePoint;
-use scenecast_protocol::directive::{
-    Areas, Band, Constraints, Destination, Fence, Limits, Polygon, Reaction, Slot, WeightedArea,
-};
+use scenecast_protocol::directive::{Areas, Band, Destination, Fence, Limits, Polygon, Reaction, WeightedArea};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -192,18 +190,8 @@ impl LimitsOrder {
     }
 }
 
-/// The name of an order for people: hold, resume and abort share a slot.
-pub fn order_name(order: &Slot) -> &'static str {
-    match order {
-        Slot::Constraints(Constraints { abort: true, .. }) => "abort",
-        Slot::Constraints(Constraints { hold: true, .. }) => "hold",
-        Slot::Constraints(_) => "resume",
-        other => other.id().name(),
-    }
-}
-
 /// A weight of -1 to 1 as it is sent.
-pub(super) fn hundredths(what: Weighed, weight: f64) -> Result<i8, OrderRefusal> {
+pub(crate) fn hundredths(what: Weighed, weight: f64) -> Result<i8, OrderRefusal> {
     let is_allowed = (-1.0..=1.0).contains(&weight);
     is_allowed.then_some((weight * 100.0).round() as i8).ok_or(OrderRefusal::Weight { what, weight })
 }

@@ -1,9 +1,7 @@
-//! The operator's settings of a vehicle: as typed, as ordered, and as in force.
+//! Settings of a vehicle as the operator types them.
 
-use super::refusal::OrderRefusal;
-use scenecast_protocol::directive::{
-    AtEnd, CellBand, Change, OrderStatus, PlannerKind, Registration, Settings, ShortDecimal,
-};
+use crate::refusal::OrderRefusal;
+use scenecast_protocol::directive::{AtEnd, CellBand, Change, PlannerKind, Registration, Settings, ShortDecimal};
 use scenecast_protocol::map::{LayerMask, LayerSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -147,66 +145,9 @@ impl SettingsOrder {
     }
 }
 
-/// The ordered settings of a vehicle. Each order contains everything that this surface has ordered, so that a newer one
-/// can replace one that the vehicle never received.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SettingsRecord {
-    requested: Settings,
-    in_force: Settings,
-    /// An order was replaced before its fate was known.
-    is_unsure: bool,
-}
-
-impl SettingsRecord {
-    /// Everything that this surface has ordered.
-    pub fn requested(&self) -> &Settings {
-        &self.requested
-    }
-
-    /// The requested settings, those that the vehicle applied last, and whether an order was replaced before its fate was known.
-    pub(super) fn parts(&self) -> (Settings, Settings, bool) {
-        (self.requested, self.in_force, self.is_unsure)
-    }
-
-    /// The record with these [`Self::parts`].
-    pub(super) fn of_parts(requested: Settings, in_force: Settings, is_unsure: bool) -> Self {
-        Self { requested, in_force, is_unsure }
-    }
-
-    /// The settings that the vehicle has applied, as far as this surface ordered them; `None` while that is unknown.
-    pub fn in_force(&self) -> Option<&Settings> {
-        (!self.is_unsure).then_some(&self.in_force)
-    }
-
-    /// The complete settings to send for an order: the earlier orders, unless they were refused, and the new one.
-    pub(super) fn next_order(&self, order: &Settings, last: Option<OrderStatus>) -> Settings {
-        let base = if matches!(last, Some(OrderStatus::Refused(_))) { &self.in_force } else { &self.requested };
-        base.then(order)
-    }
-
-    /// The settings were sent. `last` is the status of the order that they replace.
-    pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<OrderStatus>) {
-        self.is_unsure |= matches!(last, Some(OrderStatus::OnAir | OrderStatus::Received));
-        self.requested = settings;
-    }
-
-    /// The vehicle reports settings of another surface, and this one has ordered none.
-    pub(super) fn handle_reported(&mut self, settings: Settings) {
-        *self = Self { requested: settings, in_force: settings, is_unsure: false };
-    }
-
-    /// The vehicle has decided about the last order.
-    pub(super) fn handle_decision(&mut self, status: OrderStatus) {
-        if status == OrderStatus::Applied {
-            (self.in_force, self.is_unsure) = (self.requested, false);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::directive::RefusalReason;
     use scenecast_protocol::map::BUILT_IN_LAYERS;
 
     fn read(json: &str) -> Result<Settings, String> {
@@ -266,37 +207,5 @@ mod tests {
             let low = if name == "scene.refine_words_per_s" { 0.0 } else { *range.start() };
             assert_eq!(key.rule.range, (low, *range.end()), "{name}");
         }
-    }
-
-    #[test]
-    fn settings_in_force_are_those_that_the_vehicle_applied() {
-        let order = |json: &str| read(json).unwrap();
-        let mut record = SettingsRecord::default();
-        let send = |record: &mut SettingsRecord, json: &str, last| {
-            let settings = record.next_order(&order(json), last);
-            record.handle_sent(settings, last);
-        };
-        send(&mut record, r#"{"alpha": 0.5}"#, None);
-        assert_eq!(record.in_force(), Some(&Settings::default()));
-        send(&mut record, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
-        record.handle_decision(OrderStatus::Applied);
-        assert_eq!(
-            record.in_force(),
-            Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)),
-            "the first was never sent alone"
-        );
-        send(&mut record, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
-        send(&mut record, r#"{"beta": 1}"#, Some(OrderStatus::Received));
-        assert_eq!(record.in_force(), None, "the vehicle may follow the layers already");
-        let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
-        record.handle_decision(refused);
-        send(&mut record, r#"{"alpha": 0}"#, Some(refused));
-        assert_eq!(
-            record.requested(),
-            &order(r#"{"alpha": 0, "gamma": 0.1}"#),
-            "what was refused is not asked for again"
-        );
-        record.handle_decision(OrderStatus::Applied);
-        assert_eq!(record.in_force(), Some(record.requested()));
     }
 }

@@ -2,16 +2,16 @@
 
 use crate::state::{
     CommandChangeName, CommandChangeState, CommandHolderState, CommandRequestState, CommandState, MapPlacement, Origin,
-    PrincipalInfo, PrincipalRole, StorageInfo, SurfacePosition,
+    PrincipalInfo, PrincipalRole, StorageInfo, SurfacePosition, seconds,
 };
 use crate::truth::Truth;
+use crate::{COMMAND_SILENCE, Command, CommandChange, CommandChangeKind, Principal, Role, Surface};
 use scenecast_config::{self as config, Config};
 use scenecast_core::LatLon;
 use scenecast_messages::contents::Stamps;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
-use scenecast_surface::{COMMAND_SILENCE, Command, CommandChange, CommandChangeKind, Principal, Role, Surface};
 use std::sync::Arc;
 
 /// Facts of the mission that the surface does not have.
@@ -72,11 +72,6 @@ fn configured_origin(config: &Config) -> Option<Origin> {
     Some(Origin { lat_deg, lon_deg })
 }
 
-/// Mission time in the API, rounded to a hundredth of a second.
-pub(crate) fn seconds(at: Instant) -> f64 {
-    (at.as_secs_f64() * 100.0).round() / 100.0
-}
-
 pub(crate) fn command_state(command: &Command, now: Instant) -> CommandState {
     CommandState {
         holder: command.holder().map(|h| CommandHolderState {
@@ -97,7 +92,7 @@ pub(crate) fn command_state(command: &Command, now: Instant) -> CommandState {
 }
 
 /// A principal as the API shows it.
-pub(crate) fn principal_info(principal: &Principal) -> PrincipalInfo {
+pub fn principal_info(principal: &Principal) -> PrincipalInfo {
     PrincipalInfo { name: principal.name().to_owned(), role: role(principal.role()) }
 }
 

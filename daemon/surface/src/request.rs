@@ -4,13 +4,18 @@ mod described;
 mod maps;
 mod refused;
 
-use crate::export::MapCells;
 use crate::fit::{self, Fit};
+use crate::map_cells::MapCells;
 use crate::orders::{
     BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder,
 };
+use crate::record::StoredLabel;
 use crate::snapshot::command_state;
 use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, ReplayEventList, ReplayOrder, ReplayState};
+use crate::{
+    AreasOrder, CommandAction, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind, OrderRefusal,
+    RequestKind, SettingsOrder, Surface, order_name,
+};
 use described::describe;
 pub use maps::{archived_cells, former_labels};
 use scenecast_core::tuning_table::NoRow;
@@ -20,11 +25,6 @@ use scenecast_protocol::map::Cell;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::record::StoredLabel;
-use scenecast_surface::{
-    AreasOrder, CommandAction, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind, OrderRefusal,
-    RequestKind, SettingsOrder, Surface, order_name,
-};
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -98,12 +98,12 @@ pub enum SurfaceRequest {
 
 impl SurfaceRequest {
     /// Whether it changes nothing, so that it needs no principal.
-    pub(crate) fn is_reading(&self) -> bool {
+    pub fn is_reading(&self) -> bool {
         self.order_kind().is_none() && !matches!(self, Self::Command(_) | Self::Barred(..))
     }
 
     /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
-    pub(crate) fn order_kind(&self) -> Option<OrderKind> {
+    pub fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
             Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents => None,

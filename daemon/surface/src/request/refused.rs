@@ -1,10 +1,10 @@
 //! Orders that the surface refuses itself.
 
 use super::Reply;
+use crate::{CommandRefusal, LogEntry, LogKind, Role, Surface};
 use scenecast_protocol::link::OtherSurface;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{CommandRefusal, LogEntry, LogKind, Role, Surface};
 use std::time::Duration;
 
 /// The log has at most so many refusals of a principal in [`LOG_SPAN`].

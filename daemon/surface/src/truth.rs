@@ -1,7 +1,7 @@
 //! The true classes of a simulated sea floor, for comparison with the map.
 
 use crate::state::TruthInfo;
-use axum::body::Bytes;
+use bytes::Bytes;
 
 /// The true classes of a part of a simulated sea floor.
 #[derive(Debug, Clone, PartialEq)]

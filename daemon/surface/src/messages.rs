@@ -1,12 +1,10 @@
 //! The state of a vehicle as messages of ROS 2, for those who publish and those who record it.
 
-use crate::export::MapCells;
+use crate::map_cells::MapCells;
 use crate::state::{
     ExemplarStage, LinkSummary, MapLabelTree, MissionState, OrderProgress, OrderStatus, StatusReport, UtilityTerms,
     VehicleState,
 };
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use scenecast_core::{LatLon, TangentPlane};
 use scenecast_messages::builtin_interfaces::Time;
 use scenecast_messages::contents::{Grid, Place, Stamps, WORLD_FRAME, fix, header, path};
@@ -15,8 +13,7 @@ use scenecast_messages::scenecast_msgs::{self, LabelTree, Link, Order};
 use scenecast_messages::sensor_msgs::NavSatFix;
 use scenecast_messages::std_msgs::Header;
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::{LayerDescriptor, Quantity};
-use serde::{Deserialize, Serialize};
+use scenecast_protocol::map::Quantity;
 use serde_json::json;
 
 /// Which labels become one at coarser cuts.
@@ -24,38 +21,6 @@ pub fn label_tree(vehicle: &VehicleState, tree: &MapLabelTree, header: Header) -
     let (into, joins) = tree.merges.iter().copied().unzip();
     let clearest = tree.clearest.unwrap_or(0);
     LabelTree { header, vehicle: vehicle.name.clone(), epoch: vehicle.map.epoch.into(), into, joins, clearest }
-}
-
-/// The meaning of a layer's levels in a record, as JSON.
-#[derive(Serialize, Deserialize)]
-struct LayerText {
-    name: String,
-    unit: String,
-    is_depth: bool,
-    /// The bounds of levels in units: level n lies from `edges[n - 1]` to `edges[n]`.
-    edges: Vec<f64>,
-    /// Base64 of the descriptor's bytes on the wire.
-    descriptor: String,
-}
-
-/// The meaning of a layer's levels as text for a record.
-pub fn layer_text(descriptor: &LayerDescriptor) -> String {
-    let bounds = |level| descriptor.bounds(level).unwrap_or_default();
-    let text = LayerText {
-        name: descriptor.name.clone().into_owned(),
-        unit: descriptor.unit.clone().into_owned(),
-        is_depth: descriptor.quantity == Quantity::Depth,
-        edges: (1..=descriptor.levels).map(|n| bounds(n).0).chain([bounds(descriptor.levels).1]).collect(),
-        descriptor: STANDARD.encode(descriptor.to_bytes()),
-    };
-    // Strings, numbers and lists of these, so this cannot fail.
-    serde_json::to_string(&text).unwrap_or_default()
-}
-
-/// Reads [`layer_text`]; `None` if it is another text.
-pub(crate) fn layer_of_text(text: &str) -> Option<LayerDescriptor> {
-    let text: LayerText = serde_json::from_str(text).ok()?;
-    LayerDescriptor::from_bytes(&STANDARD.decode(text.descriptor).ok()?)
 }
 
 /// An order with its content as the HTTP API takes it; `None` for a position fix, which the surface gives by itself.
@@ -146,8 +111,8 @@ fn place_on_path(vehicle: &VehicleState, status: &StatusReport, stamp: Time, (ea
 /// A map with its layers as a grid in the world frame; `None` without cells, or with too many for a message.
 pub fn grid(cells: &MapCells, shift_m: (f64, f64)) -> Option<Grid> {
     let mut grid = Grid::new(cells.bounds?, cells.cell_m, shift_m, |cell| cells.label(cell))?;
-    for layer in cells.layers() {
-        let descriptor = layer.descriptor();
+    for layer in &cells.layers {
+        let descriptor = &layer.descriptor;
         grid.add_layer(&descriptor.name, descriptor.quantity == Quantity::Depth, |cell| layer.value(cell));
     }
     Some(grid)

@@ -1,12 +1,11 @@
 //! The exemplars of a label, and the request for another one.
 
-use super::facts::seconds;
-use crate::state::{ExemplarImage, ExemplarProgress, ExemplarStage};
+use crate::state::{ExemplarImage, ExemplarProgress, ExemplarStage, seconds};
+use crate::{ExemplarCache, RequestState, StoredExemplar, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, SlotId};
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{ExemplarCache, RequestState, StoredExemplar, VehicleRecord};
 
 /// `shift_m` moves places of the vehicle's map frame into the world frame.
 pub(super) fn progress(

@@ -5,18 +5,18 @@ mod facts;
 mod link;
 mod vehicle;
 
-pub use facts::{MissionFacts, measured_origin};
-pub(crate) use facts::{command_state, principal_info, seconds};
+pub(crate) use facts::command_state;
+pub use facts::{MissionFacts, measured_origin, principal_info};
 pub(crate) use vehicle::marker;
 
+use crate::Surface;
 use crate::link_meter::LinkMeter;
-use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState};
+use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState, seconds};
 use crate::truth::Truth;
-use axum::body::Bytes;
+use bytes::Bytes;
 use scenecast_messages::contents::Stamps;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor};
 use scenecast_protocol::time::Instant;
-use scenecast_surface::Surface;
 use std::sync::Arc;
 
 /// The state at one moment.
@@ -32,7 +32,8 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    pub(crate) fn new(state: MissionState, truth: Option<Arc<Truth>>, stamps: Stamps) -> Self {
+    /// A state with its JSON.
+    pub fn new(state: MissionState, truth: Option<Arc<Truth>>, stamps: Stamps) -> Self {
         // All keys of maps in these types are strings or numbers, so this cannot fail.
         let json = serde_json::to_vec(&state).unwrap_or_default().into();
         Self { state, json, truth, stamps }

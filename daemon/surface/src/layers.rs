@@ -1,10 +1,10 @@
 //! The layers of a map in addition to the labels, from the levels that the surface has received.
 
-use crate::export::CellLayer;
+use crate::map_cells::CellLayer;
 use scenecast_protocol::map::{LayerReplica, Spread};
 
 /// The layers of a map.
-pub(crate) fn layers(layers: &[&LayerReplica]) -> Vec<CellLayer> {
+pub fn cell_layers(layers: &[&LayerReplica]) -> Vec<CellLayer> {
     layers.iter().map(|replica| layer(replica)).collect()
 }
 

@@ -1,9 +1,9 @@
 //! Rates on air over time at the surface.
 
-use crate::state::LinkRates;
+use super::state::LinkRates;
+use super::surface::Surface;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
-use scenecast_surface::Surface;
 use std::collections::VecDeque;
 use std::time::Duration;
 
