@@ -1,9 +1,11 @@
 //! Published labels: numbers from 1 to 254 whose meaning never changes within an epoch.
 
+mod in_step;
 mod memory;
 
 use std::collections::BTreeMap;
 
+pub use in_step::in_step;
 pub use memory::TopicMemory;
 use serde::{Deserialize, Serialize};
 
@@ -64,7 +66,7 @@ pub struct LabelBook {
     /// The topics that held enough cells in the last call.
     held: Vec<TopicId>,
     /// The topic that each cell showed after the last call, sorted by (y, x).
-    shown: Vec<(i32, i32, TopicId)>,
+    shown: Vec<((i32, i32), TopicId)>,
 }
 
 impl LabelBook {
@@ -136,7 +138,7 @@ impl LabelBook {
         for (index, cell) in cells.iter().enumerate() {
             let Some(topic) = known[index].or_else(|| self.around(cells, &known, index)) else { continue };
             if self.ids.contains_key(&topic) {
-                self.shown.push((cell.y, cell.x, topic));
+                self.shown.push(((cell.y, cell.x), topic));
             }
         }
         self.published(cells)
@@ -145,14 +147,13 @@ impl LabelBook {
     /// Returns the result of the last [`Self::publish`] for the same map; a restored book continues with it.
     #[must_use]
     pub fn published(&self, cells: &[FlatCell]) -> Vec<PublishedCell> {
-        let mut cells = cells.iter();
-        let publish = |&(y, x, topic): &(i32, i32, TopicId)| {
-            let label = self.label_of(topic)?;
-            let cell = cells.find(|cell| (cell.y, cell.x) == (y, x))?;
-            let confidence = if topic == cell.topic { cell.confidence } else { 0.0 };
-            Some(PublishedCell { x, y, label, confidence, perplexity: cell.perplexity })
+        let shown = self.shown.iter().map(|(place, topic)| (place, *topic));
+        let publish = |(cell, topic): (&FlatCell, Option<TopicId>)| {
+            let label = self.label_of(topic?)?;
+            let confidence = if topic == Some(cell.topic) { cell.confidence } else { 0.0 };
+            Some(PublishedCell { x: cell.x, y: cell.y, label, confidence, perplexity: cell.perplexity })
         };
-        self.shown.iter().filter_map(publish).collect()
+        in_step(shown, cells, |cell| (cell.y, cell.x)).filter_map(publish).collect()
     }
 
     fn give_ids(&mut self, cells: &[FlatCell]) {
@@ -179,16 +180,11 @@ impl LabelBook {
 
     /// For each cell, its own topic if that has a label, otherwise the topic that it showed before.
     fn known_topics(&self, cells: &[FlatCell]) -> Vec<Option<TopicId>> {
-        let mut before = self.shown.iter().peekable();
-        let mut known = Vec::with_capacity(cells.len());
-        for cell in cells {
-            let place = (cell.y, cell.x);
-            while before.next_if(|shown| (shown.0, shown.1) < place).is_some() {}
-            let shown = before.next_if(|shown| (shown.0, shown.1) == place).map(|shown| shown.2);
-            let candidates = [Some(cell.topic), shown];
-            known.push(candidates.into_iter().flatten().find(|topic| self.ids.contains_key(topic)));
-        }
-        known
+        let shown = self.shown.iter().map(|(place, topic)| (place, *topic));
+        let known = |(cell, shown): (&FlatCell, Option<TopicId>)| {
+            [Some(cell.topic), shown].into_iter().flatten().find(|topic| self.ids.contains_key(topic))
+        };
+        in_step(shown, cells, |cell| (cell.y, cell.x)).map(known).collect()
     }
 
     /// The topic of most of the four neighbours, ties to the oldest topic.

@@ -2,18 +2,21 @@
 
 use scenecast_config::Config;
 use scenecast_files::{Recording, configured_recording};
+use scenecast_protocol::map::LayerDescriptor;
 use scenecast_protocol::map::{Cell, LayerId};
 use scenecast_rehearsal::{Mission, MissionOptions, World};
 use scenecast_tests::{RELIEF_CAMERA, is_on_block, relief_depth_m, scratch, write_relief};
-use scenecast_vehicle::{Frame, MapUpdate, Mapper};
+use scenecast_vehicle::{Frame, MapChanges, Mapper};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
 const CELL_M: f64 = 0.25;
+const DEPTH_STEP_M: f64 = 0.1;
 
 fn config(dir: &Path, sets: &[&str]) -> Result<Config, String> {
     let mut all = vec![
+        format!("map.depth_step_m={DEPTH_STEP_M}"),
         format!("camera.source=tum:{}", dir.display()),
         format!("camera.matrix={RELIEF_CAMERA:?}"),
         format!("scene.cell_m={CELL_M}"),
@@ -25,32 +28,34 @@ fn config(dir: &Path, sets: &[&str]) -> Result<Config, String> {
 }
 
 /// The map of a recording, whose frames are changed before.
-fn map(config: &Config, change: impl FnOnce(&mut Recording)) -> MapUpdate {
+fn map(config: &Config, change: impl FnOnce(&mut Recording)) -> MapChanges {
     let mut recording = configured_recording(config).unwrap().unwrap();
     change(&mut recording);
     let mut mapper = Mapper::new(config, None, 0, 1).unwrap();
-    let mut update = mapper.current();
     for frame in &recording.frames {
         let (image, view) = frame.read().unwrap();
         let pose =
             scene_model::project::Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
         let shot = Frame { image: &image, pose, scale: frame.scale, view: view.as_ref() };
         let placed = mapper.register(&shot);
-        update = mapper.handle_frame(&shot.placed(&placed), frame.t_s);
+        mapper.handle_frame(&shot.placed(&placed), frame.t_s);
     }
-    update
+    mapper.current()
 }
 
 /// Of the cells away from the block's edge, which hold its walls: the share of those on the block whose depth is right by 0.2 m;
 /// and cells that are of the block by label and in truth, over those that are so by one of both.
-fn scores(map: &MapUpdate) -> (f64, f64) {
+fn scores(map: &MapChanges) -> (f64, f64) {
     let is_block =
         |cell: Cell| is_on_block((f64::from(cell.x) + 0.5) * CELL_M, (f64::from(cell.y) + 0.5) * CELL_M, 0.8 * CELL_M);
+    let scale = LayerDescriptor::depth_around(Config::default().survey.depth_m, DEPTH_STEP_M);
     let on_block = map.layers[&LayerId::DEPTH].iter().filter(|(cell, _)| is_block(*cell) == Some(true));
-    let errors: Vec<f64> = on_block.map(|(_, depth_m)| (depth_m - relief_depth_m(true)).abs()).collect();
+    let depths = on_block.map(|(_, level)| scale.middle(*level).unwrap());
+    let errors: Vec<f64> = depths.map(|depth_m| (depth_m - relief_depth_m(true)).abs()).collect();
     let right = errors.iter().filter(|error| **error < 0.2).count() as f64 / errors.len() as f64;
     let mut votes: BTreeMap<u8, i32> = BTreeMap::new();
-    let cells: Vec<(bool, u8)> = map.cells.iter().filter_map(|&(cell, label)| Some((is_block(cell)?, label))).collect();
+    let cells: Vec<(bool, u8)> =
+        map.labels.as_ref().unwrap().cells.iter().filter_map(|&(cell, label)| Some((is_block(cell)?, label))).collect();
     for &(is_block, label) in &cells {
         *votes.entry(label).or_default() += if is_block { 1 } else { -1 };
     }
@@ -88,13 +93,13 @@ fn a_sequence_with_depth_is_rehearsed() {
     write_relief(&dir);
     let sets = ["registration.enabled=false", "operator.script=none", "survey.duration_s=90"];
     let config = config(&dir, &sets).unwrap();
-    let direct = map(&config, |_| {});
+    let direct = map(&config, |_| {}).labels.unwrap().cells;
     let options = MissionOptions { world: World::patches(2, 0.01), seed: 1, record: None };
     let mut mission = Mission::new(config, options).unwrap();
     mission.run(Duration::from_secs(3600), &mut |_| Ok(())).unwrap();
     let sent = mission.vehicle().map();
-    let cells = direct.cells.iter().filter(|(cell, _)| sent.get(*cell) > 0).count();
-    assert!(cells > direct.cells.len() * 9 / 10, "{cells} of {}", direct.cells.len());
+    let cells = direct.iter().filter(|(cell, _)| sent.get(*cell) > 0).count();
+    assert!(cells > direct.len() * 9 / 10, "{cells} of {}", direct.len());
 }
 
 #[test]

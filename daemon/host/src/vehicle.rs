@@ -9,7 +9,7 @@ use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{EquipmentFaults, UtcHours, VehicleMode};
 use scenecast_vehicle::{
-    AppliedSlot, ForeignUpdate, MapUpdate, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
+    AppliedSlot, MapChanges, RegisteredFrame, SharedExemplars, Vehicle, VehicleDisk, VehicleOutput,
 };
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -250,7 +250,7 @@ impl VehicleHost {
         &mut self,
         pose: Option<CameraPose>,
         registered: Option<&RegisteredFrame>,
-        update: &MapUpdate,
+        changes: &MapChanges,
         exemplars: SharedExemplars,
         now: Instant,
     ) {
@@ -261,7 +261,7 @@ impl VehicleHost {
         if let Some(frame) = registered {
             self.handle_registration(frame, now);
         }
-        self.handle_map(update, now);
+        self.handle_changes(changes, now);
         self.handle_exemplars(exemplars, now);
         self.finish_after_last_frame();
     }
@@ -277,14 +277,10 @@ impl VehicleHost {
         self.link.end_mut().handle_registration(frame, now);
     }
 
-    /// Takes a new map of the mapper.
-    pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
-        self.link.end_mut().handle_map(update, now);
-    }
-
-    /// Takes a new map of another program. Returns the label whose name is refused, because it has another one already.
-    pub fn handle_foreign(&mut self, update: &ForeignUpdate, now: Instant) -> Option<u8> {
-        self.link.end_mut().handle_foreign(update, now)
+    /// Takes changes of the map, of the mapper or of another program. Returns the label whose name is refused, because it has
+    /// another one already.
+    pub fn handle_changes(&mut self, changes: &MapChanges, now: Instant) -> Option<u8> {
+        self.link.end_mut().handle_changes(changes, now)
     }
 
     /// Takes the mapper's exemplars of each label, the best first.

@@ -10,7 +10,7 @@ use scenecast_core::Area;
 use scenecast_host::{VehicleHost, VehicleHostEvent, channel_station};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::MapUpdate;
+use scenecast_vehicle::MapChanges;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -42,7 +42,7 @@ impl TopicScene {
     }
 
     /// A topic is born and, one time in three, another one dies; returns the map.
-    fn see(&mut self, rng: &mut DiskRng, born: &mut u64) -> MapUpdate {
+    fn see(&mut self, rng: &mut DiskRng, born: &mut u64) -> MapChanges {
         if self.topics.len() < 4 {
             *born += 1;
             self.topics.push(TopicId(self.next_topic));
@@ -64,17 +64,7 @@ impl TopicScene {
         let flat: Vec<FlatCell> = self.topics.iter().enumerate().map(cell).collect();
         let published = self.book.publish(&flat);
         let cells = published.iter().map(|c| (Cell::new(c.x, c.y), c.label)).collect();
-        let (layers, perplexity) = (BTreeMap::new(), Vec::new());
-        MapUpdate {
-            t_s: 0.0,
-            epoch: self.book.epoch(),
-            cells,
-            layers,
-            perplexity,
-            labels: self.book.labels().count() as u8,
-            tree: None,
-            seen: None,
-        }
+        MapChanges::of_labels(self.book.epoch(), self.book.labels().count() as u8, cells)
     }
 
     fn meaning(&self, label: u8) -> Option<u64> {
@@ -134,13 +124,13 @@ impl LabelTrial {
         let mut host = VehicleHost::new(vehicle, station, None);
         for frame in 1..=FRAMES {
             self.disk.step(DiskStep::Host).ok()?;
-            let update = scene.see(&mut self.rng, &mut self.born);
+            let changes = scene.see(&mut self.rng, &mut self.born);
             // The model's thread keeps a checkpoint before or after the link's thread receives the map of the frame.
             let first = self.rng.below(2) == 0;
             if first && frame % CHECKPOINT_INTERVAL == 0 {
                 file.keep(&postcard::to_allocvec(&scene).unwrap()).ok()?;
             }
-            self.publish(&mut host, &mut keeper, &update, &scene)?;
+            self.publish(&mut host, &mut keeper, &changes, &scene)?;
             if !first && frame % CHECKPOINT_INTERVAL == 0 {
                 file.keep(&postcard::to_allocvec(&scene).unwrap()).ok()?;
             }
@@ -153,10 +143,10 @@ impl LabelTrial {
         &mut self,
         host: &mut VehicleHost,
         keeper: &mut Keeper<Disk>,
-        update: &MapUpdate,
+        changes: &MapChanges,
         scene: &TopicScene,
     ) -> Option<()> {
-        host.handle_map(update, Instant::ZERO);
+        host.handle_changes(changes, Instant::ZERO);
         while let Some(event) = host.poll_event() {
             if event == VehicleHostEvent::Persist {
                 keeper.save(host.vehicle().durable()).then_some(())?;

@@ -7,7 +7,7 @@ use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Settings;
 use scenecast_sensors::{DepthError, ImageSize};
-use scenecast_vehicle::{CameraFinding, Frame, MapProducer, MapUpdate, Mapper, RegisteredFrame, SharedExemplars};
+use scenecast_vehicle::{CameraFinding, Frame, MapChanges, MapProducer, Mapper, RegisteredFrame, SharedExemplars};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
@@ -21,7 +21,7 @@ pub(super) enum ToMapper {
 
 /// A report of the mapper's thread.
 pub(super) enum FromMapper {
-    /// The map after a camera frame, or at the start of the run.
+    /// What a camera frame has changed of the map, or the map at the start of the run.
     Mapped(Box<Mapped>),
     /// A camera frame that could not be read.
     Missed(UserError),
@@ -35,7 +35,7 @@ pub(super) struct Mapped {
     pub(super) frame: Option<CameraFrame>,
     /// The place of a frame that was mapped.
     pub(super) registered: Option<RegisteredFrame>,
-    pub(super) update: MapUpdate,
+    pub(super) changes: MapChanges,
     /// The best images of each label so far.
     pub(super) exemplars: SharedExemplars,
     /// Why distances that came with the frame were not used.
@@ -130,7 +130,7 @@ impl Work {
     fn run(mut self, mut incoming: mpsc::UnboundedReceiver<ToMapper>) {
         let mut is_host_alive = true;
         if self.mapper.last_s().is_some() {
-            is_host_alive = self.report_current(None);
+            is_host_alive = self.report_unmapped(None, self.mapper.current());
         }
         while is_host_alive && let Some(order) = incoming.blocking_recv() {
             match order {
@@ -141,7 +141,7 @@ impl Work {
                 }
                 // A frame beyond the frame rate only changes the vehicle's pose.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
-                    is_host_alive = self.report_current(Some(*frame));
+                    is_host_alive = self.report_unmapped(Some(*frame), self.mapper.unchanged());
                 }
                 ToMapper::Frame(frame) => {
                     let report = self.see(*frame);
@@ -165,10 +165,9 @@ impl Work {
         is_known || self.report(FromMapper::Checkpoint { is_refused })
     }
 
-    /// Sends the map as it is, without a new frame in it.
-    fn report_current(&mut self, frame: Option<CameraFrame>) -> bool {
-        let update = self.mapper.current();
-        let mapped = self.mapped(frame, None, update);
+    /// Sends changes without a new frame in them.
+    fn report_unmapped(&mut self, frame: Option<CameraFrame>, changes: MapChanges) -> bool {
+        let mapped = self.mapped(frame, None, changes);
         self.report(FromMapper::Mapped(Box::new(mapped)))
     }
 
@@ -190,16 +189,21 @@ impl Work {
                     Some(CameraFinding::Wrong(advice)) => tracing::warn!("camera: {advice}"),
                     None => {}
                 }
-                let update = self.mapper.handle_frame(&shot.placed(&placed), frame.t_s);
-                let mapped = self.mapped(Some(frame), Some(placed), update);
+                let changes = self.mapper.handle_frame(&shot.placed(&placed), frame.t_s);
+                let mapped = self.mapped(Some(frame), Some(placed), changes);
                 FromMapper::Mapped(Box::new(Mapped { unusable_depth, ..mapped }))
             }
             Err(error) => FromMapper::Missed(error),
         }
     }
 
-    fn mapped(&mut self, frame: Option<CameraFrame>, registered: Option<RegisteredFrame>, update: MapUpdate) -> Mapped {
-        Mapped { frame, registered, update, exemplars: self.mapper.shared_exemplars(), unusable_depth: None }
+    fn mapped(
+        &mut self,
+        frame: Option<CameraFrame>,
+        registered: Option<RegisteredFrame>,
+        changes: MapChanges,
+    ) -> Mapped {
+        Mapped { frame, registered, changes, exemplars: self.mapper.shared_exemplars(), unusable_depth: None }
     }
 }
 

@@ -13,7 +13,7 @@ use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_vehicle::{Durable, MapUpdate};
+use scenecast_vehicle::{Durable, MapChanges};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -244,18 +244,8 @@ impl PowerCutTrial {
         }
         let label = onboard.book_epoch % LABELS + 1;
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
-        let (layers, perplexity) = (BTreeMap::new(), Vec::new());
-        let update = MapUpdate {
-            t_s: 0.0,
-            epoch: onboard.book_epoch,
-            cells,
-            layers,
-            perplexity,
-            labels: LABELS,
-            tree: None,
-            seen: None,
-        };
-        onboard.host.handle_map(&update, Instant::ZERO + TICK * self.ticks);
+        let changes = MapChanges::of_labels(onboard.book_epoch, LABELS, cells);
+        onboard.host.handle_changes(&changes, Instant::ZERO + TICK * self.ticks);
     }
 
     fn host_step(&self) -> Result<(), PowerCut> {

@@ -21,7 +21,7 @@ use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, mo
 use scenecast_labels::ImagePose;
 use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::map::LayerSet;
-use scenecast_vehicle::ForeignUpdate;
+use scenecast_vehicle::{MapChanges, MapProducer};
 use std::time::Duration;
 
 /// Maximum time between two calls of the host.
@@ -202,7 +202,7 @@ impl VehicleShell {
                 config = self.reload.next() => self.follow(&config),
                 () = self.camera.wait() => {}
                 report = LabelThread::next(&mut self.labels.thread) => match report {
-                    Some(FromLabels::Mapped(update, pose)) => self.handle_labels(&update, pose),
+                    Some(FromLabels::Mapped(changes, pose)) => self.handle_labels(&changes, pose),
                     Some(FromLabels::Checkpoint { is_refused }) => {
                         self.disk.handle_checkpoint(Checkpoint::Labels, is_refused);
                     }
@@ -269,13 +269,13 @@ impl VehicleShell {
 
     /// Takes changes of another program. Unless something else measures its place, the vehicle is where the last image was
     /// taken.
-    fn handle_labels(&mut self, update: &ForeignUpdate, pose: Option<ImagePose>) {
+    fn handle_labels(&mut self, changes: &MapChanges, pose: Option<ImagePose>) {
         let (now, began) = (self.clock.now(), std::time::Instant::now());
         let pose = pose.filter(|_| self.labels.move_vehicle && self.camera.newest_pose().is_none());
         if let Some(ImagePose { x_m, y_m, depth_m, heading_rad }) = pose {
             self.host.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
         }
-        if let Some(label) = self.host.handle_foreign(update, now) {
+        if let Some(label) = self.host.handle_changes(changes, now) {
             tracing::warn!("labels: class {} has another name already, which it keeps", label - 1);
         }
         self.labels.thread.iter().for_each(|labels| labels.handle_taken(began));
@@ -322,7 +322,7 @@ impl VehicleShell {
             let line = self.disagreement.handle(places.0, places.1, std::time::Instant::now());
             line.iter().for_each(|line| tracing::warn!("camera: {line}"));
         }
-        self.host.handle_mapped(pose, registered, &mapped.update, mapped.exemplars, now);
+        self.host.handle_mapped(pose, registered, &mapped.changes, mapped.exemplars, now);
     }
 
     /// Logs an unreadable frame; it does not end the mission.

@@ -1,8 +1,7 @@
 //! The checkpoint of a mapper: the scene model, its labels, its vocabulary and its exemplars as bytes.
 
-use super::levels::HeldLevels;
-use super::mapper::{Mapper, label_by};
-use super::relief::Relief;
+use super::cells::Cells;
+use super::mapper::Mapper;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
 use scene_model::habitats::Habitats;
@@ -14,9 +13,8 @@ use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_registration::Registrar;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
-const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 2 };
+const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 3 };
 
 /// The reason why a checkpoint cannot be restored.
 #[derive(Debug, thiserror::Error)]
@@ -37,27 +35,19 @@ pub enum RestoreError {
 }
 
 #[derive(Serialize, Deserialize)]
-struct CheckpointContent<M, B, W, E, R> {
+struct CheckpointContent<M, B, W, E, C> {
     lineage: u64,
     last_s: Option<f64>,
     model: M,
     book: B,
     words: W,
     exemplars: E,
-    relief: R,
+    cells: C,
 }
 
-/// The content after [`CheckpointContent`]: the last sight of each cell, the light, the registration, the discriminant, the
-/// inference under way, the habitats, and the levels of the layers.
-type AddedContent<'a> = (
-    BTreeMap<(i32, i32), f64>,
-    Option<FlatField>,
-    Option<&'a [u8]>,
-    Option<Discriminant>,
-    OnlineInference,
-    Option<Habitats>,
-    HeldLevels,
-);
+/// The content after [`CheckpointContent`]: the light, the registration, the discriminant, the inference under way, and the
+/// habitats.
+type AddedContent<'a> = (Option<FlatField>, Option<&'a [u8]>, Option<Discriminant>, OnlineInference, Option<Habitats>);
 
 /// A mapper that continues from a checkpoint, and the mission that it belongs to.
 pub struct Restored {
@@ -67,7 +57,7 @@ pub struct Restored {
 
 impl Mapper {
     /// Encodes the mapper for [`Mapper::restore`]. `lineage` is the number of the mission.
-    pub fn save(&self, lineage: u64) -> Vec<u8> {
+    pub(super) fn encode(&self, lineage: u64) -> Vec<u8> {
         let kept = CheckpointContent {
             lineage,
             last_s: self.last_s,
@@ -75,12 +65,12 @@ impl Mapper {
             book: &self.book,
             words: self.extractor.measures(),
             exemplars: &self.exemplars,
-            relief: &self.relief,
+            cells: &self.cells,
         };
         let registration = self.registrar.as_ref().map(Registrar::save);
         let measures = self.extractor.measures();
-        let Self { last_seen_s, light, online, habitats, levels, .. } = self;
-        let added = (last_seen_s, light, registration, measures.discriminant(), online, habitats, levels);
+        let Self { light, online, habitats, .. } = self;
+        let added = (light, registration, measures.discriminant(), online, habitats);
         ENVELOPE.seal(&postcard::to_allocvec(&(kept, added)).unwrap_or_default())
     }
 
@@ -88,9 +78,9 @@ impl Mapper {
     /// apply until [`Mapper::tune`] sets others.
     pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, RestoreError> {
         let content = ENVELOPE.open(bytes)?;
-        let (kept, added): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, AddedContent<'_>) =
+        let (kept, added): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Cells>, AddedContent<'_>) =
             postcard::from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
-        let (last_seen_s, light, registration, discriminant, online, habitats, levels) = added;
+        let (light, registration, discriminant, online, habitats) = added;
         let kept_words = kept.words.with_discriminant(discriminant);
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
@@ -102,19 +92,14 @@ impl Mapper {
             return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
-        (mapper.last_seen_s, mapper.levels) = (last_seen_s, levels);
         mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
         let kept_registrar = registration.and_then(registrar_of).map(|kept| kept.with_loops(config.registration.loops));
         mapper.registrar = kept_registrar.or(mapper.registrar);
         mapper.extractor = WordExtractor::from_measures(kept_words);
         (mapper.model, mapper.book) = (model, kept.book);
-        (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
-        mapper.online = online;
-        mapper.flat = mapper.online.map(&mapper.model);
-        mapper.habitats = habitats;
-        if let Some(habitats) = &mapper.habitats {
-            label_by(habitats, &mut mapper.flat);
-        }
+        (mapper.exemplars, mapper.cells, mapper.last_s) = (kept.exemplars, kept.cells, kept.last_s);
+        (mapper.online, mapper.habitats) = (online, habitats);
+        mapper.restore_map();
         Ok(Restored { mapper, lineage: kept.lineage })
     }
 }
@@ -137,19 +122,19 @@ fn continues(kept: &Measures, configured: &Measures) -> bool {
 mod tests {
     use super::*;
     use crate::Frame;
-    use crate::MapUpdate;
+    use crate::{MapChanges, MapProducer};
     use image::{Rgb, RgbImage};
     use scene_model::project::Pose;
     use scene_model::words::{FEATURES, WordConfig};
     use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
-    use scenecast_protocol::map::LayerId;
+    use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerId};
 
     fn config(sets: &[&str]) -> Config {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
         scenecast_config::load(None, &sets).unwrap()
     }
 
-    fn frame(mapper: &mut Mapper, at: u32) -> super::super::MapUpdate {
+    fn frame(mapper: &mut Mapper, at: u32) -> MapChanges {
         let image = RgbImage::from_fn(160, 120, |x, y| {
             let kind = ((x + 40 * at) / 240 + y / 120) % 3;
             Rgb([(kind * 90 + x % 7) as u8, (200 - kind * 60 + y % 5) as u8, ((x * y) % 31) as u8])
@@ -175,8 +160,9 @@ mod tests {
         let Restored { mapper: mut restored, lineage } = Mapper::restore(config, None, &whole.save(77)).unwrap();
         assert_eq!((lineage, restored.epoch(), restored.last_s()), (77, 3, Some(22.0)));
         assert_eq!(restored.current(), shown);
-        assert!(shown.cells.len() > 20 && shown.labels >= 2);
-        for label in 1..=shown.labels {
+        let labels = shown.labels.unwrap();
+        assert!(labels.cells.len() > 20 && labels.highest >= 2);
+        for label in 1..=labels.highest {
             assert_eq!(restored.exemplars(label), whole.exemplars(label));
         }
         for at in 12..20 {
@@ -187,18 +173,21 @@ mod tests {
     #[test]
     fn the_last_sight_of_a_cell_ages_until_it_is_seen_again() {
         let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
-        (0..3).for_each(|_| drop(frame(&mut mapper, 0)));
-        let first = frame(&mut mapper, 0).layers.remove(&LayerId::LAST_SEEN).unwrap();
-        assert!(first.len() > 3 && first.iter().all(|&(_, minutes)| minutes == 0.0));
+        (0..4).for_each(|_| drop(frame(&mut mapper, 0)));
+        let scale = &BUILT_IN_LAYERS[LayerId::LAST_SEEN.index()].descriptor;
+        let levels = |mapper: &Mapper| mapper.current().layers.remove(&LayerId::LAST_SEEN).unwrap();
+        let first = levels(&mapper);
+        assert!(first.len() > 3 && first.iter().all(|&(_, level)| level == scale.level(0.0, 0)));
         let (seen, _) = first[0];
-        let age = |update: &MapUpdate| update.layers[&LayerId::LAST_SEEN].iter().find(|(c, _)| *c == seen).unwrap().1;
-        assert_eq!(age(&frame(&mut mapper, 45)), 1.5);
-        let later = frame(&mut mapper, 90);
-        assert_eq!((age(&later), later.cells.len()), (3.0, later.layers[&LayerId::LAST_SEEN].len()));
+        let age = |mapper: &Mapper| levels(mapper).iter().find(|(cell, _)| *cell == seen).unwrap().1;
+        frame(&mut mapper, 45);
+        assert_eq!(age(&mapper), scale.level(1.5, 0));
+        frame(&mut mapper, 90);
+        let cells = mapper.current().labels.unwrap().cells;
+        assert_eq!((age(&mapper), cells.len()), (scale.level(3.0, 0), levels(&mapper).len()));
         let image = RgbImage::from_pixel(160, 120, Rgb([90, 120, 60]));
-        let again =
-            mapper.handle_frame(&Frame::flat(&image, Pose { x: 0.0, y: 0.0, z: -4.0, yaw_rad: 0.0 }, 1.0), 200.0);
-        assert_eq!(age(&again), 0.0);
+        mapper.handle_frame(&Frame::flat(&image, Pose { x: 0.0, y: 0.0, z: -4.0, yaw_rad: 0.0 }, 1.0), 200.0);
+        assert_eq!(age(&mapper), scale.level(0.0, 0));
     }
 
     #[test]
@@ -257,7 +246,7 @@ mod tests {
         let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), None, &whole.save(7)).unwrap().mapper;
         other.tune(&Settings::default());
         assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured without an order");
-        assert_eq!(frame(&mut other, 9).epoch, 3);
+        assert_eq!(frame(&mut other, 9).labels.unwrap().epoch, 3);
     }
 
     #[test]

@@ -5,31 +5,30 @@
 //! the surface, estimates the position and chooses waypoints. Neither does IO.
 
 mod assemble;
+mod cells;
+mod changes;
 mod checkpoint;
 pub mod exemplar;
 mod failsafe;
 mod foreign;
 mod frame;
-mod levels;
 mod mapper;
 mod navigator;
 mod picker;
 pub mod planning;
-mod producer;
 mod registration;
-mod relief;
 mod steering;
 mod track;
 mod vehicle;
 
 pub use assemble::{assemble, link_config};
+pub use changes::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame};
 pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};
-pub use foreign::{ForeignMap, ForeignRestoreError, ForeignSource, ForeignUpdate, LabelChanges};
+pub use foreign::{ForeignMap, ForeignRestoreError, ForeignSource};
 pub use frame::Frame;
-pub use mapper::{MapUpdate, Mapper, SeenFrame, SharedExemplars};
+pub use mapper::{Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, LastPlace, Navigator};
-pub use producer::MapProducer;
 pub use registration::{FoundFrame, RegisteredFrame};
 pub use scenecast_registration::CameraFinding;
 pub use steering::{Course, Footprint, Steering};

@@ -1,10 +1,10 @@
 //! The mapper: from camera frames to the label map.
 
 use super::assemble::descriptors;
+use super::cells::{CellChanges, Cells, LayerScales};
 use super::frame::{Frame, Projection};
-use super::levels::{HeldLevels, Quantities};
 use super::picker::{Judge, PATCH_PX};
-use super::relief::Relief;
+use crate::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame};
 use image::RgbImage;
 use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 use scene_model::habitats::{Habitats, LabelTree as HabitatTree, measure};
@@ -16,7 +16,7 @@ use scene_model::words::{FlatField, Measures, Word, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
-use scenecast_protocol::map::{Cell, LabelTree, LayerDescriptor, LayerId};
+use scenecast_protocol::map::{Cell, LabelTree};
 use scenecast_registration::{GeometryCheck, Registrar};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,44 +27,8 @@ const EXEMPLARS_KEPT: usize = 4;
 /// Smallest and largest edge of a cell in frames whose view gives the size of their pixels, pixels.
 const CELL_PX: (f32, f32) = (4.0, 400.0);
 
-/// Gives cells the labels of habitats; a cell that no frame has shown well enough is left out.
-pub(super) fn label_by(habitats: &Habitats, cells: &mut Vec<FlatCell>) {
-    cells.retain_mut(|cell| {
-        let shown = habitats.cell(cell.x, cell.y);
-        shown.inspect(|shown| (cell.topic, cell.confidence) = (TopicId(shown.label), shown.confidence)).is_some()
-    });
-}
-
 /// The best exemplars of each label that has any, the best first.
 pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
-
-/// The label map after a camera frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MapUpdate {
-    /// Mission time of the frame, seconds.
-    pub t_s: f64,
-    pub epoch: u8,
-    /// The label of every explored cell.
-    pub cells: Vec<(Cell, u8)>,
-    /// The quantities of each layer, in the unit of its descriptor, each within the level that the cell has.
-    pub layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
-    pub labels: u8,
-    /// The perplexity of each cell under the model.
-    pub perplexity: Vec<(Cell, f32)>,
-    /// Which labels become one at coarser cuts; `None` where that is not known.
-    pub tree: Option<LabelTree>,
-    /// The frame; `None` if the map is no frame's.
-    pub seen: Option<SeenFrame>,
-}
-
-/// A camera frame after which the map is as it is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SeenFrame {
-    /// The pose of the camera in the vehicle's map frame: by registration, where that is on.
-    pub camera: Pose,
-    /// Visual words of each cell.
-    pub words: Vec<(Cell, u32)>,
-}
 
 /// The tree of the labels that are published.
 fn published_tree(habitats: &HabitatTree, book: &LabelBook) -> Option<LabelTree> {
@@ -98,16 +62,14 @@ pub struct Mapper {
     pub(super) exemplars: ExemplarStore,
     /// The exemplars of the last [`Mapper::shared_exemplars`].
     shared: SharedExemplars,
-    pub(super) relief: Relief,
+    pub(super) cells: Cells,
     /// `None` as long as no frame was to be placed by images.
     pub(super) registrar: Option<Registrar>,
     /// Whether images place the frames; otherwise odometry and compass do.
     pub(super) registers: bool,
     /// Whether the camera is as configured, by the next frames; `None` unless that is asked, and once it was told.
     pub(super) geometry: Option<GeometryCheck>,
-    /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
-    pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
-    pub(super) levels: HeldLevels,
+    scales: LayerScales,
     refine_words_per_s: f64,
     /// Maximum rate of camera frames, 1/s; `None`: every frame.
     frames_per_s: Option<f64>,
@@ -125,7 +87,6 @@ struct Configured {
     refine_words_per_s: f64,
     frames_per_s: Option<f64>,
     labels: u32,
-    layers: BTreeMap<LayerId, LayerDescriptor>,
 }
 
 /// A configured frame rate, where 0 stands for every frame.
@@ -173,12 +134,11 @@ impl Mapper {
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
             shared: SharedExemplars::default(),
-            relief: Relief::default(),
+            cells: Cells::default(),
             registrar: registers.then(|| registrar.clone()),
             registers,
             geometry: None,
-            last_seen_s: BTreeMap::new(),
-            levels: HeldLevels::default(),
+            scales: LayerScales::new(&descriptors(config).collect()),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
             configured: Configured {
@@ -188,7 +148,6 @@ impl Mapper {
                 refine_words_per_s: f64::from(config.scene.refine_words_per_s),
                 frames_per_s: every_frame_or(config.scene.frames_per_s),
                 labels: config.scene.max_labels,
-                layers: descriptors(config).collect(),
             },
             last_s: None,
             flat: Vec::new(),
@@ -230,7 +189,7 @@ impl Mapper {
     }
 
     /// Maps a frame of mission time `t_s`, and refines the model in proportion to the time since the last frame.
-    pub fn handle_frame(&mut self, frame: &Frame<'_>, t_s: f64) -> MapUpdate {
+    pub fn handle_frame(&mut self, frame: &Frame<'_>, t_s: f64) -> MapChanges {
         let Frame { image, pose, .. } = *frame;
         let projection = Projection::of(frame, &self.camera);
         let mut cell_px = (self.cell_m / projection.metres_per_pixel()) as f32;
@@ -249,14 +208,12 @@ impl Mapper {
         self.model.insert(t_s, &observations);
         for seen in &observations {
             let cell = Cell::new(self.cell(seen.x), self.cell(seen.y));
-            self.relief.add(cell, -seen.z);
-            self.last_seen_s.insert((cell.x, cell.y), t_s);
+            self.cells.see(cell, -seen.z, t_s);
         }
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.online.learn(t_s, &self.model);
         self.add_habitats(image, &projection, &pose, cell_px);
-        let published = self.book.publish(&self.flat);
         let (cell_m, metres_per_pixel) = (self.cell_m, projection.metres_per_pixel());
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
         judge.review(&mut self.exemplars);
@@ -265,10 +222,7 @@ impl Mapper {
             projection.project(image.dimensions(), &pose, &centre).first().map(|seen| (seen.x, seen.y))
         };
         judge.offer(&mut self.exemplars, image, place, t_s);
-        let mut layers = self.quantities(&published);
-        self.levels.hold(&self.configured.layers, &mut layers);
-        let words = self.flat.iter().map(|cell| (Cell::new(cell.x, cell.y), cell.words)).collect();
-        MapUpdate { seen: Some(SeenFrame { camera: pose, words }), ..self.update(&published, layers) }
+        self.publish(t_s, pose)
     }
 
     /// Adds a frame to the habitats, if the labels are habitats, and labels the map by them.
@@ -280,64 +234,59 @@ impl Mapper {
         if habitats.update() {
             tracing::debug!("the map has hardly grown for a while: its labels are corrected");
         }
-        label_by(habitats, &mut self.flat);
+        self.flat = habitats.labelled(&self.flat);
     }
 
-    /// The map after the last frame.
-    pub fn current(&self) -> MapUpdate {
-        let published = self.book.published(&self.flat);
-        let mut layers = self.quantities(&published);
-        self.levels.clone().hold(&self.configured.layers, &mut layers);
-        self.update(&published, layers)
-    }
-
-    fn quantities(&self, published: &[PublishedCell]) -> Quantities {
-        let place = |c: &PublishedCell| Cell::new(c.x, c.y);
-        let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
-        let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
-        let curiosity = published.iter().map(|c| (place(c), f64::from(c.perplexity.max(1.0)).log2())).collect();
-        let t_s = self.last_s.unwrap_or(0.0);
-        let minutes = |c: &PublishedCell| Some((t_s - self.last_seen_s.get(&(c.x, c.y))?).max(0.0) / 60.0);
-        let last_seen = published.iter().filter_map(|c| Some((place(c), minutes(c)?))).collect();
-        BTreeMap::from([
-            (LayerId::CONFIDENCE, confidence),
-            (LayerId::DEPTH, depth),
-            (LayerId::CURIOSITY, curiosity),
-            (LayerId::LAST_SEEN, last_seen),
-        ])
-    }
-
-    fn update(&self, published: &[PublishedCell], layers: Quantities) -> MapUpdate {
-        let place = |c: &PublishedCell| Cell::new(c.x, c.y);
-        MapUpdate {
-            t_s: self.last_s.unwrap_or(0.0),
-            epoch: self.book.epoch(),
-            cells: published.iter().map(|c| (place(c), c.label)).collect(),
-            layers,
-            perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
-            labels: self.book.labels().count() as u8,
-            tree: self.habitats.as_ref().and_then(|habitats| published_tree(habitats.tree(), &self.book)),
-            seen: None,
+    /// Publishes the model's map, and returns what the frame of mission time `t_s` has changed of it.
+    fn publish(&mut self, t_s: f64, camera: Pose) -> MapChanges {
+        let epoch = self.book.epoch();
+        let published = self.book.publish(&self.flat);
+        if self.book.epoch() != epoch {
+            self.cells.clear_map();
         }
+        let changes = self.cells.take(&published, t_s, &self.scales);
+        let cells = changes.labels.iter().map(|shown| (Cell::new(shown.x, shown.y), shown.label)).collect();
+        let frame = Some(self.seen_frame(&changes, t_s, camera));
+        MapChanges { labels: Some(self.labelled(cells)), frame, ..changes.into() }
     }
 
-    /// Continues after a restart in `epoch`. Labels up to `published` may be known at the surface.
-    pub fn resume(&mut self, epoch: u8, published: u8) {
-        if self.book.epoch() == epoch {
-            self.book.resume(published);
-        } else {
-            self.book.begin_epoch(epoch);
+    fn seen_frame(&self, changes: &CellChanges<'_>, t_s: f64, camera: Pose) -> SeenFrame {
+        let cell = |shown: &&PublishedCell| {
+            let at = self.flat.binary_search_by_key(&(shown.y, shown.x), |cell| (cell.y, cell.x)).ok()?;
+            let words = self.flat.get(at)?.words;
+            Some(SeenCell { cell: Cell::new(shown.x, shown.y), words, confidence: shown.confidence })
+        };
+        SeenFrame { t_s, camera, cells: changes.labels.iter().filter_map(cell).collect() }
+    }
+
+    fn labelled(&self, cells: Vec<(Cell, u8)>) -> LabelChanges {
+        let tree = self.habitats.as_ref().and_then(|habitats| published_tree(habitats.tree(), &self.book));
+        LabelChanges { epoch: self.book.epoch(), highest: self.book.labels().count() as u8, cells, tree }
+    }
+
+    /// The whole map after the last frame, as changes of an empty one.
+    pub fn current(&self) -> MapChanges {
+        let (cells, layers) = self.cells.all();
+        MapChanges { labels: Some(self.labelled(cells)), ..layers }
+    }
+
+    /// The changes of a frame that is not mapped: none.
+    pub fn unchanged(&self) -> MapChanges {
+        MapChanges { labels: Some(self.labelled(Vec::new())), ..MapChanges::default() }
+    }
+
+    /// Puts the map of the last frame on the cells, after a restart.
+    pub(super) fn restore_map(&mut self) {
+        self.flat = self.online.map(&self.model);
+        if let Some(habitats) = &self.habitats {
+            self.flat = habitats.labelled(&self.flat);
         }
+        let _ = self.cells.take(&self.book.published(&self.flat), self.last_s.unwrap_or(0.0), &self.scales);
     }
 
     /// The configured size of a pixel on the sea floor, metres.
     pub(super) fn metres_per_pixel(&self) -> f64 {
         self.camera.metres_per_pixel
-    }
-
-    /// Mission time of the last frame, seconds.
-    pub fn last_s(&self) -> Option<f64> {
-        self.last_s
     }
 
     fn cell(&self, metres: f64) -> i32 {
@@ -364,10 +313,6 @@ impl Mapper {
         self.shared.clone()
     }
 
-    pub fn epoch(&self) -> u8 {
-        self.book.epoch()
-    }
-
     pub fn cells(&self) -> usize {
         self.model.cells()
     }
@@ -384,5 +329,28 @@ impl Mapper {
     /// Perplexity of all words under the model.
     pub fn perplexity(&self) -> f64 {
         self.model.perplexity()
+    }
+}
+
+impl MapProducer for Mapper {
+    fn epoch(&self) -> u8 {
+        self.book.epoch()
+    }
+
+    fn last_s(&self) -> Option<f64> {
+        self.last_s
+    }
+
+    fn resume(&mut self, epoch: u8, published: u8) {
+        if self.book.epoch() == epoch {
+            self.book.resume(published);
+        } else {
+            self.book.begin_epoch(epoch);
+            self.cells.clear_map();
+        }
+    }
+
+    fn save(&self, lineage: u64) -> Vec<u8> {
+        self.encode(lineage)
     }
 }

@@ -157,7 +157,7 @@ impl RegistrationMonitor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Restored;
+    use crate::{MapProducer, Restored};
     use image::{Rgb, RgbImage};
     use scene_model::project::Pose;
     use scenecast_config::Config;

@@ -33,6 +33,7 @@ pub use clusters::LabelTree;
 pub use measures::{MEASURES, MeasuredPoint, MeasuredValues, measure};
 
 use crate::project::Observation;
+use crate::publish::in_step;
 use crate::topics::{FlatCell, TopicId};
 use crate::words::Word;
 use cells::{CellMap, Coordinates, Space, smoothed, squared_distance};
@@ -336,10 +337,14 @@ impl Habitats {
         }
     }
 
-    /// The cell at (x, y); `None` until it has been labelled.
+    /// Gives the cells of a map, sorted by (y, x), their habitats. A cell that no frame has shown well enough is left out.
     #[must_use]
-    pub fn cell(&self, x: i32, y: i32) -> Option<HabitatCell> {
-        self.shown.get(&(y, x)).copied()
+    pub fn labelled(&self, cells: &[FlatCell]) -> Vec<FlatCell> {
+        let label = |(cell, shown): (&FlatCell, Option<&HabitatCell>)| {
+            let &HabitatCell { label, confidence } = shown?;
+            Some(FlatCell { topic: TopicId(label), confidence, ..*cell })
+        };
+        in_step(&self.shown, cells, |cell| (cell.y, cell.x)).filter_map(label).collect()
     }
 
     /// The map, sorted by (y, x): of each labelled cell the number of its habitat as its topic.
@@ -355,7 +360,7 @@ impl Habitats {
     /// The label of the cell at (x, y); `None` until it has been labelled.
     #[must_use]
     pub fn label_at(&self, x: i32, y: i32) -> Option<u32> {
-        self.cell(x, y).map(|cell| cell.label)
+        self.shown.get(&(y, x)).map(|cell| cell.label)
     }
 
     /// The number of labels that cells show.

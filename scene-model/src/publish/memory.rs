@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use super::in_step;
 use crate::topics::{FlatCell, TopicId};
 
 /// Time in which a vote loses all but 1/e of its weight, seconds.
@@ -53,29 +54,40 @@ struct CellMemory {
     maps: f32,
 }
 
+fn place(cell: &&FlatCell) -> (i32, i32) {
+    (cell.y, cell.x)
+}
+
 impl TopicMemory {
-    /// Counts the map of the time `t_s` in seconds. Topics that no cell of it has are forgotten.
+    /// Counts the map of the time `t_s` in seconds, sorted by (y, x). Topics that no cell of it has are forgotten.
     pub fn learn(&mut self, t_s: f64, cells: &[FlatCell]) {
         let passed_s = (t_s - self.last_s.replace(t_s).unwrap_or(t_s)).clamp(0.0, MAX_STEP_S);
         let kept = (-passed_s / MEMORY_S).exp() as f32;
         let alive: BTreeSet<TopicId> = cells.iter().map(|cell| cell.topic).collect();
-        for cell in cells {
+        let mut fresh = Vec::new();
+        for (cell, memory) in in_step(&mut self.cells, cells, place) {
+            match memory {
+                Some(memory) => memory.learn(cell, kept, &alive),
+                None => fresh.push(cell),
+            }
+        }
+        for cell in fresh {
             let fresh = || CellMemory { shown: cell.topic, votes: Vec::new(), maps: 0.0 };
-            self.cells.entry((cell.y, cell.x)).or_insert_with(fresh).learn(cell, kept, &alive);
+            self.cells.entry(place(&cell)).or_insert_with(fresh).learn(cell, kept, &alive);
         }
     }
 
-    /// Returns the map with the remembered topic of each cell.
+    /// Returns the map, sorted by (y, x), with the remembered topic of each cell.
     ///
     /// The confidence of a cell is the mean of its confidence in this topic over the remembered maps, 0 for those that
     /// showed another one. A cell that is not remembered stays as it is.
     #[must_use]
     pub fn steady(&self, cells: &[FlatCell]) -> Vec<FlatCell> {
-        let steady = |cell: &FlatCell| match self.cells.get(&(cell.y, cell.x)) {
+        let steady = |(cell, memory): (&FlatCell, Option<&CellMemory>)| match memory {
             Some(memory) => FlatCell { topic: memory.shown, confidence: memory.confidence(), ..*cell },
             None => *cell,
         };
-        cells.iter().map(steady).collect()
+        in_step(&self.cells, cells, place).map(steady).collect()
     }
 }
 

@@ -4,6 +4,7 @@
 
 use crate::console::ConsoleBench;
 use crate::exemplar::ExemplarBench;
+use crate::frame::FrameBench;
 use crate::inference::InferenceBench;
 use crate::labels::LabelsBench;
 use crate::live::LiveBench;
@@ -41,6 +42,8 @@ enum Bench {
     Exemplar(ExemplarBench),
     /// Vehicles that lose the folder with their orders: what they do, and when they have them again.
     Forget(ForgetBench),
+    /// A camera frame at the vehicle: CPU time from the image to the map that the link sends, as the map grows.
+    Frame(FrameBench),
     /// Inference under way: information of the online map against a batch over the same frames, and bytes of the map.
     Inference(InferenceBench),
     /// Labels: the same in any order and on any path, against the true classes, and of worse sights.
@@ -79,6 +82,7 @@ impl Arguments {
             Bench::Console(c) => c.run(),
             Bench::Exemplar(e) => e.run(),
             Bench::Forget(f) => f.run(),
+            Bench::Frame(f) => f.run(),
             Bench::Inference(i) => i.run(),
             Bench::Labels(l) => l.run(),
             Bench::Live(l) => l.run(),

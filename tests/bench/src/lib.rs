@@ -6,6 +6,7 @@ mod arguments;
 mod console;
 mod cpu_meter;
 mod exemplar;
+mod frame;
 mod inference;
 mod labels;
 mod link_ends;

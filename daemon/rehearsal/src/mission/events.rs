@@ -212,10 +212,10 @@ impl Mission {
             true_at: (self.motion.x_m, self.motion.y_m),
             mapped_at: (placed.pose.x, placed.pose.y),
         });
-        let update = self.mapper.handle_frame(&frame.placed(&placed), t_s);
-        self.vehicle.handle_map(&update, now);
+        let changes = self.mapper.handle_frame(&frame.placed(&placed), t_s);
+        self.vehicle.handle_changes(&changes, now);
         self.vehicle.handle_exemplars(self.mapper.shared_exemplars(), now);
-        self.logbook.note_update(self.vehicle.vehicle(), update);
+        self.logbook.note_changes(self.vehicle.vehicle(), &changes, now);
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use scenecast_files::{FolderItem, LabelFolder, read_class_names};
 use scenecast_host::CameraPose;
 use scenecast_labels::{Content, ImagePose, ItemTime};
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{ForeignMap, ForeignSource, MapProducer};
+use scenecast_vehicle::{ForeignMap, ForeignSource};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
@@ -130,12 +130,9 @@ impl Mission {
             self.vehicle.handle_pose(CameraPose { x_m, y_m, heading_rad, depth_m }, now);
         }
         if is_changed {
-            self.vehicle.handle_foreign(&labels.map.take_changes(usize::MAX), now);
-        }
-        if is_changed && is_foreign {
-            let mut map = labels.map.current();
-            map.cells.sort_by_key(|(cell, _)| (cell.y, cell.x));
-            self.logbook.note_update(self.vehicle.vehicle(), map);
+            let changes = labels.map.take_changes(usize::MAX);
+            self.vehicle.handle_changes(&changes, now);
+            self.logbook.note_changes(self.vehicle.vehicle(), &changes, now);
         }
     }
 

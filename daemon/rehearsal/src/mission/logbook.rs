@@ -5,10 +5,10 @@ use scenecast_host::{FrameEvent, VehicleHostEvent};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::PeerView;
-use scenecast_protocol::map::Cell;
+use scenecast_protocol::map::{Cell, LabelGrid, UNEXPLORED};
 use scenecast_protocol::time::Instant;
 use scenecast_registration::FrameGraph;
-use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle};
+use scenecast_vehicle::{AppliedSlot, MapChanges, Vehicle};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -39,7 +39,9 @@ pub(crate) struct Logbook {
     pub(crate) poses: Vec<FramePoses>,
     /// All registered frames, to place them together after the survey.
     pub(crate) graph: FrameGraph,
-    pub(crate) update: Option<MapUpdate>,
+    /// The vehicle's map as its producers have given it, and its highest label.
+    map: LabelGrid,
+    pub(crate) labels: u8,
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,
     map_version: u64,
@@ -90,29 +92,21 @@ impl Logbook {
         }
     }
 
-    /// The mapper has taken a frame, and the vehicle its update.
-    pub(super) fn note_update(&mut self, vehicle: &Vehicle, update: MapUpdate) {
+    /// The vehicle has taken changes of the map.
+    pub(super) fn note_changes(&mut self, vehicle: &Vehicle, changes: &MapChanges, now: Instant) {
+        let Some(labels) = &changes.labels else { return };
         if vehicle.map_version() != self.map_version {
             self.map_version = vehicle.map_version();
             let png = scenecast_core::label_picture::encode(vehicle.map());
             self.png_full_bytes += png.map_or(0, |png| png.len() as u64);
         }
-        let before = self.update.take().map(|update| update.cells).unwrap_or_default();
-        self.note_cells(&before, &update);
-        self.update = Some(update);
-    }
-
-    /// Compares the cells of two maps, both sorted by y and x.
-    fn note_cells(&mut self, before: &[(Cell, u8)], after: &MapUpdate) {
-        let place = |cell: &Cell| (cell.y, cell.x);
-        let mut before = before.iter().peekable();
-        for (cell, label) in &after.cells {
-            while before.next_if(|(earlier, _)| place(earlier) < place(cell)).is_some() {}
-            match before.next_if(|(earlier, _)| earlier == cell) {
-                Some((_, earlier)) => self.flips += u64::from(earlier != label),
-                None => _ = self.first_seen_s.entry(*cell).or_insert(after.t_s),
+        for &(cell, label) in &labels.cells {
+            match self.map.set(cell, label) {
+                UNEXPLORED => _ = self.first_seen_s.entry(cell).or_insert(now.as_secs_f64()),
+                before => self.flips += u64::from(before != label),
             }
         }
+        self.labels = labels.highest;
     }
 }
 

@@ -8,6 +8,7 @@ use scenecast_protocol::map::{LabelGrid, LayerId};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SettingsOrder;
+use scenecast_vehicle::MapProducer;
 use std::time::Duration;
 
 pub(super) fn mission(sets: &[&str]) -> Mission {
@@ -81,7 +82,7 @@ fn same(a: &LabelGrid, b: &LabelGrid) -> bool {
 fn maps_agree_after_settings_changed_in_the_mission() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
-    let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
+    let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels.unwrap().highest);
     assert!(frames >= 50 && labels > 1 && mission.received_version(LayerId::CONFIDENCE) > 0);
     mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "layers": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
@@ -103,7 +104,7 @@ fn maps_agree_after_settings_changed_in_the_mission() {
     let received = mission.surface().view(mission.address).unwrap().layer(LayerId::CONFIDENCE).unwrap();
     assert!(same(&sent, received.levels().shown()), "a layer resumes from its last state");
     assert_eq!((mission.mapper.epoch(), mission.settings_applied()), (0, 2), "labels keep their meaning");
-    assert!(mission.mapper.current().labels >= labels);
+    assert!(mission.mapper.current().labels.unwrap().highest >= labels);
 }
 
 #[test]
@@ -129,17 +130,17 @@ fn only_coarse_cells_are_sent_until_all_are_requested_again() {
     mission.tune(r#"{"cells": "coarse"}"#);
     let known = mission.vehicle().map().clone();
     mission.fly_to(200.0);
-    let seen = mission.mapper.current().cells.len();
+    let seen = mission.mapper.current().labels.unwrap().cells.len();
     let sent = mission.vehicle().map();
     assert!(sent.explored() < seen * 2 / 3, "{} of {seen} cells are sent", sent.explored());
-    for (cell, label) in mission.mapper.current().cells {
+    for (cell, label) in mission.mapper.current().labels.unwrap().cells {
         let is_sent = Stride::Four.on_lattice(cell).is_some() || known.get(cell) != 0;
         assert_eq!(sent.get(cell), if is_sent { label } else { 0 }, "{cell:?}");
     }
     mission.drain();
     mission.tune(r#"{"cells": "fine"}"#);
     mission.drain();
-    let seen = mission.mapper.current().cells;
+    let seen = mission.mapper.current().labels.unwrap().cells;
     assert!(seen.iter().all(|&(cell, label)| mission.operators().get(cell) == label), "after the survey, too");
 }
 

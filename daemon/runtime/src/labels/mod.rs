@@ -26,7 +26,7 @@ use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_labels::{Content, ImagePose, Item, ItemTime, Refusal};
 use scenecast_protocol::map::ClassEntry;
-use scenecast_vehicle::{ForeignMap, ForeignSource, ForeignUpdate, MapProducer};
+use scenecast_vehicle::{ForeignMap, ForeignSource, MapChanges, MapProducer};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -43,7 +43,7 @@ const SLICE: usize = 1 << 13;
 /// A report of the thread.
 pub(super) enum FromLabels {
     /// Changes of the map, and the pose of the last image among the items that made them.
-    Mapped(Box<ForeignUpdate>, Option<ImagePose>),
+    Mapped(Box<MapChanges>, Option<ImagePose>),
     /// A checkpoint was refused, or the first one after a refusal was written.
     Checkpoint { is_refused: bool },
 }
@@ -190,23 +190,23 @@ impl Worker {
 
     /// Gives a slice of the changes to the vehicle.
     fn give(&mut self, pose: Option<ImagePose>) {
-        let mut update = self.map.take_changes(SLICE);
+        let mut changes = self.map.take_changes(SLICE);
         // The checkpoint comes first, so that it contains every name that the surface receives: a class keeps its name
         // after a power cut. Names that the disk refuses wait.
-        if update.classes == self.kept_names || self.keep.is_refused {
+        if changes.classes == self.kept_names || self.keep.is_refused {
             self.keep.keep_if_due(&self.map);
         } else {
             self.keep.last_s = None;
             self.keep.keep_now(&self.map);
         }
         if self.keep.is_refused {
-            update.classes.clone_from(&self.kept_names);
+            changes.classes.clone_from(&self.kept_names);
         } else {
-            self.kept_names.clone_from(&update.classes);
+            self.kept_names.clone_from(&changes.classes);
         }
         self.report_checkpoint();
         lock(&self.pace).handle_given(self.map.has_changes());
-        self.report(FromLabels::Mapped(Box::new(update), pose));
+        self.report(FromLabels::Mapped(Box::new(changes), pose));
     }
 
     /// Takes an item; returns the pose in it. `None` if it is refused.

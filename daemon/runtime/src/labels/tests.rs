@@ -49,7 +49,7 @@ impl Bench {
     }
 
     /// The next map; earlier reports on checkpoints are skipped.
-    fn map(&mut self) -> ForeignUpdate {
+    fn map(&mut self) -> MapChanges {
         loop {
             match self.thread.mapped.blocking_recv().unwrap() {
                 FromLabels::Mapped(update, _) => return *update,

@@ -14,7 +14,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::record::{EventKind, EventTime, StoredLabel};
 use scenecast_surface::{FenceOrder, Surface};
-use scenecast_vehicle::{Durable, MapUpdate};
+use scenecast_vehicle::{Durable, MapChanges};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -194,10 +194,7 @@ impl Trial {
         if self.ticks.is_multiple_of(20) {
             let many = if self.epoch == 1 { (self.ticks / 5).min(40) } else { (self.ticks - VEHICLE_RESTART).min(60) };
             let cells = (0..many as i32).map(|i| (Cell::new(i % 8, i / 8), self.epoch)).collect();
-            let (layers, perplexity) = (BTreeMap::new(), Vec::new());
-            let update =
-                MapUpdate { t_s: 0.0, epoch: self.epoch, cells, layers, perplexity, labels: 9, tree: None, seen: None };
-            self.vehicle.handle_map(&update, now);
+            self.vehicle.handle_changes(&MapChanges::of_labels(self.epoch, 9, cells), now);
         }
         self.vehicle.steer(now);
         while let Some(event) = self.vehicle.poll_event() {

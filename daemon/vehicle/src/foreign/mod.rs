@@ -6,7 +6,7 @@ mod band;
 mod checkpoint;
 mod ground;
 
-use crate::{MapProducer, MapUpdate};
+use crate::{LabelChanges, MapChanges, MapProducer};
 use band::BandMap;
 pub use checkpoint::ForeignRestoreError;
 use ground::{CellVotes, ChangingGrid, GroundRaster, Votes};
@@ -19,25 +19,6 @@ use std::collections::BTreeMap;
 
 /// A cell without a class.
 const UNKNOWN: u8 = u8::MAX;
-
-/// A part of the cells that have changed since the last update, and the names of classes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ForeignUpdate {
-    /// `None` if the scene model gives the labels.
-    pub labels: Option<LabelChanges>,
-    /// The layers of bands, with the levels of their changed cells; level 0 is not known.
-    pub bands: Vec<(LayerDescriptor, Vec<(Cell, u8)>)>,
-    pub classes: Vec<ClassEntry>,
-}
-
-/// Changed cells of the labels of another program.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LabelChanges {
-    /// 0 for a cell that has no label any more.
-    pub cells: Vec<(Cell, u8)>,
-    /// The highest label of the map so far, in these cells or elsewhere.
-    pub labels: u8,
-}
 
 /// The setting that an item of another program came in by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -277,13 +258,15 @@ impl ForeignMap {
     }
 
     /// Gives away about `most` changed cells of the labels, and as many of each band. A band without any is there too.
-    pub fn take_changes(&mut self, most: usize) -> ForeignUpdate {
-        let labels = LabelChanges { cells: self.labels.take(most), labels: self.highest };
+    pub fn take_changes(&mut self, most: usize) -> MapChanges {
+        let (epoch, highest) = (self.epoch, self.highest);
+        let labels = LabelChanges { epoch, highest, cells: self.labels.take(most), tree: None };
         let levels = |band: &mut BandMap| (band.descriptor.clone(), band.levels.take(most));
-        ForeignUpdate {
+        MapChanges {
             labels: self.has_labels.then_some(labels),
             bands: self.bands.values_mut().map(levels).collect(),
             classes: self.classes.values().cloned().collect(),
+            ..MapChanges::default()
         }
     }
 
@@ -299,14 +282,6 @@ impl ForeignMap {
 }
 
 impl MapProducer for ForeignMap {
-    fn current(&self) -> MapUpdate {
-        let erased = self.erased.iter().map(|(cell, _)| (cell, UNEXPLORED));
-        let cells: Vec<(Cell, u8)> = self.labels.grid().iter().chain(erased).collect();
-        let (t_s, labels) = (self.last_s.unwrap_or(0.0), self.highest);
-        let (layers, perplexity, tree, seen) = (BTreeMap::new(), Vec::new(), None, None);
-        MapUpdate { t_s, epoch: self.epoch, cells, layers, labels, perplexity, tree, seen }
-    }
-
     fn epoch(&self) -> u8 {
         self.epoch
     }

@@ -39,7 +39,7 @@ fn a_segmented_image_is_projected_like_a_camera_frame() {
     // Left and right of the top row: north-east and south-east.
     assert_eq!(labels(&seen), [(1, 1, 8), (2, 1, 2), (2, 2, 1)].map(|(x, y, l)| (x, y, l)));
     let changes = seen.take_changes(100).labels.unwrap();
-    assert_eq!((seen.last_s(), changes.labels, changes.cells.len()), (Some(4.0), 8, 3));
+    assert_eq!((seen.last_s(), changes.highest, changes.cells.len()), (Some(4.0), 8, 3));
     let own = item(Content::Image { pose: None, metres_per_pixel: Some(0.5), classes: raster(2, &[0, 1, 255, 7]) });
     let mut same = map(&[]);
     assert_eq!(same.handle_item(&own, ForeignSource::Labels, None, 4.0), Err(Refusal::NoPose));
@@ -74,9 +74,9 @@ fn a_grid_states_each_cell_and_can_make_it_unknown() {
     changed = stated.take_changes(100).labels.unwrap().cells;
     changed.sort();
     assert_eq!(changed, [(Cell::new(0, 0), 0), (Cell::new(0, 1), 1), (Cell::new(1, 0), 0)]);
-    assert!(stated.current().cells.contains(&(Cell::new(1, 0), 0)));
+    assert_eq!(stated.labels().get(Cell::new(1, 0)), 0);
     stated.handle_item(&grid(2, &[1, 1, 1, 1]), ForeignSource::Labels, None, 2.0).unwrap();
-    assert!(stated.current().cells.iter().all(|&(_, label)| label == 2));
+    assert!(stated.labels().iter().all(|(_, label)| label == 2));
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn the_limit_on_cells_of_labels_and_bands_counts_erased_ones() {
         map.max_cells = 5;
         let full = Err(Refusal::FullMap(5));
         assert_eq!(map.handle_item(&place(of(&[1; 6]), 0.0), ForeignSource::Labels, None, 0.0), full);
-        assert!(map.bands.is_empty() && map.current().cells.is_empty(), "nothing of it is used");
+        assert!(map.bands.is_empty() && map.labels().is_empty(), "nothing of it is used");
         map.handle_item(&place(of(&[1; 4]), 0.0), ForeignSource::Labels, None, 0.0).unwrap();
         map.handle_item(&place(of(&[2; 4]), 0.0), ForeignSource::Labels, None, 1.0).unwrap();
         map.handle_item(&place(of(&[255; 4]), 0.0), ForeignSource::Labels, None, 2.0).unwrap();
@@ -276,9 +276,9 @@ fn slices_of_a_large_map_add_up_in_the_vehicle() {
     for round in 0..3u8 {
         let (mut longest, mut slices, mut persisted) = (0f64, 0, 0);
         while map.has_changes() {
-            let update = map.take_changes(1 << 13);
+            let changes = map.take_changes(1 << 13);
             let began = std::time::Instant::now();
-            vehicle.handle_foreign(&update, Instant::ZERO);
+            vehicle.handle_changes(&changes, Instant::ZERO);
             while let Some(output) = vehicle.poll_output() {
                 if output == crate::VehicleOutput::Persist {
                     persisted += 1;

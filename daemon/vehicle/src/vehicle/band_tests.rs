@@ -1,7 +1,7 @@
 //! Bands of another program beside the scene model's map: what the link is given of them, and when.
 
 use super::Vehicle;
-use crate::{Durable, ForeignUpdate, MapUpdate};
+use crate::{Durable, MapChanges};
 use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Budget, CellBand, Change, Settings, Slot};
@@ -10,7 +10,6 @@ use scenecast_protocol::map::{
 };
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::time::Instant;
-use std::collections::BTreeMap;
 
 const AREA: Area = Area { west: 0.0, south: 0.0, east: 40.0, north: 30.0 };
 /// On the lattice of coarse cells, and beside it.
@@ -45,15 +44,13 @@ fn give(vehicle: &mut Vehicle, levels: &[(Cell, u8)]) {
 
 /// Gives levels of a band with this share of the link.
 fn give_of(vehicle: &mut Vehicle, share: u8, levels: &[(Cell, u8)]) {
-    let update = ForeignUpdate { labels: None, bands: vec![(descriptor(share), levels.to_vec())], classes: Vec::new() };
-    vehicle.handle_foreign(&update, Instant::ZERO);
+    let changes = MapChanges { bands: vec![(descriptor(share), levels.to_vec())], ..MapChanges::default() };
+    vehicle.handle_changes(&changes, Instant::ZERO);
 }
 
 /// A map of the scene model in an epoch.
 fn see(vehicle: &mut Vehicle, epoch: u8, cells: &[(Cell, u8)]) {
-    let (cells, layers, perplexity) = (cells.to_vec(), BTreeMap::new(), Vec::new());
-    let update = MapUpdate { t_s: 0.0, epoch, cells, layers, perplexity, labels: 4, tree: None, seen: None };
-    vehicle.handle_map(&update, Instant::ZERO);
+    vehicle.handle_changes(&MapChanges::of_labels(epoch, 4, cells.to_vec()), Instant::ZERO);
     vehicle.handle_persisted();
 }
 

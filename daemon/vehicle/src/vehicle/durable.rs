@@ -1,6 +1,6 @@
 //! The part of the vehicle's state that its host stores, with the keys that the surface has given.
 
-use crate::LastPlace;
+use crate::{LabelChanges, LastPlace};
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::Series;
 use scenecast_protocol::link::{Authenticity, SlotInboxState};
@@ -60,6 +60,15 @@ impl Durable {
     /// The destination in force, in the world frame.
     pub fn destination(&self) -> Option<DecimetrePoint> {
         self.destination.map(|(east_dm, north_dm)| DecimetrePoint::new(east_dm, north_dm))
+    }
+
+    /// Claims the labels of a map; returns whether it has others than were claimed so far.
+    pub(super) fn claim(&mut self, map: &LabelChanges) -> bool {
+        let is_more = map.epoch != self.epoch || map.highest > self.labels;
+        if is_more {
+            (self.epoch, self.labels) = (map.epoch, map.highest);
+        }
+        is_more
     }
 }
 

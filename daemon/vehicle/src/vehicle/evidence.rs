@@ -1,10 +1,10 @@
 //! From which camera frame each cell has its label, and what the scene model knew of it then.
 
 use super::frame_clock::FrameClock;
-use crate::MapUpdate;
+use crate::{SeenCell, SeenFrame};
 use scene_model::project::Pose;
-use scenecast_protocol::map::{Cell, LayerId};
-use std::collections::{BTreeMap, BTreeSet};
+use scenecast_protocol::map::Cell;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A camera frame that was mapped.
@@ -23,7 +23,7 @@ pub struct Evidence {
     pub frame: Arc<MappedFrame>,
     /// Visual words in the cell after that frame.
     pub words: u32,
-    /// How sure the label was then, 0 to 1; NaN where the scene model does not tell.
+    /// How sure the label was then, 0 to 1.
     pub confidence: f32,
 }
 
@@ -32,14 +32,11 @@ pub struct Evidence {
 pub(super) struct EvidenceByCell(BTreeMap<Cell, Evidence>);
 
 impl EvidenceByCell {
-    /// These cells have changed with the update.
-    pub(super) fn handle_change(&mut self, changed: &BTreeSet<Cell>, update: &MapUpdate, frames: FrameClock) {
-        let Some((seen, taken)) = update.seen.as_ref().zip(frames.taken(update.t_s)) else { return };
+    /// A frame has changed cells of the map.
+    pub(super) fn handle_frame(&mut self, seen: &SeenFrame, frames: FrameClock) {
+        let Some(taken) = frames.taken(seen.t_s) else { return };
         let frame = Arc::new(MappedFrame { taken_s: taken.as_secs_f64(), camera: seen.camera });
-        let confidence = update.layers.get(&LayerId::CONFIDENCE).into_iter().flatten();
-        let confidence: BTreeMap<Cell, f64> = confidence.copied().filter(|(cell, _)| changed.contains(cell)).collect();
-        for &(cell, words) in seen.words.iter().filter(|(cell, _)| changed.contains(cell)) {
-            let confidence = confidence.get(&cell).map_or(f32::NAN, |share| *share as f32);
+        for &SeenCell { cell, words, confidence } in &seen.cells {
             self.0.insert(cell, Evidence { frame: frame.clone(), words, confidence });
         }
     }

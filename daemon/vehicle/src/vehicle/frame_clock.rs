@@ -1,6 +1,6 @@
 //! When camera frames were taken, by the vehicle's clock.
 
-use crate::mapper::MapUpdate;
+use crate::SeenFrame;
 use scenecast_protocol::time::Instant;
 
 /// Turns the times of camera frames into those of the vehicle's clock. Frames have a time of their own, which begins with the first
@@ -12,14 +12,11 @@ pub(super) struct FrameClock {
 }
 
 impl FrameClock {
-    /// Takes the map after a frame, or another one.
-    pub(super) fn handle(&mut self, update: &MapUpdate, now: Instant) {
-        if update.seen.is_none() {
-            return;
-        }
-        // A frame reaches the map some time after it was taken: the least difference is the nearest.
-        let ahead_s = now.as_secs_f64() - update.t_s;
-        self.run = Some(self.run.map_or((update.t_s, ahead_s), |(first_s, least_s)| (first_s, least_s.min(ahead_s))));
+    /// A frame has reached the map.
+    pub(super) fn handle(&mut self, seen: &SeenFrame, now: Instant) {
+        // That is some time after it was taken: the least difference is the nearest.
+        let ahead_s = now.as_secs_f64() - seen.t_s;
+        self.run = Some(self.run.map_or((seen.t_s, ahead_s), |(first_s, least_s)| (first_s, least_s.min(ahead_s))));
     }
 
     /// The time of a frame; `None` for one of an earlier run, whose clock is gone.
@@ -32,34 +29,19 @@ impl FrameClock {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mapper::SeenFrame;
     use scene_model::project::Pose;
-
-    fn update(t_s: f64, seen: Option<SeenFrame>) -> MapUpdate {
-        MapUpdate {
-            t_s,
-            epoch: 1,
-            cells: Vec::new(),
-            layers: Default::default(),
-            labels: 0,
-            perplexity: Vec::new(),
-            tree: None,
-            seen,
-        }
-    }
 
     #[test]
     fn frames_of_this_run_have_its_clock_and_earlier_ones_none() {
         let mut clock = FrameClock::default();
-        let mut frame = |t_s: f64, now_s: f64, is_seen: bool| {
+        let mut frame = |t_s: f64, now_s: f64| {
             let camera = Pose { x: 0.0, y: 0.0, z: 0.0, yaw_rad: 0.0 };
-            let seen = is_seen.then(|| SeenFrame { camera, words: Vec::new() });
-            clock.handle(&update(t_s, seen), Instant::from_secs_f64(now_s));
+            clock.handle(&SeenFrame { t_s, camera, cells: Vec::new() }, Instant::from_secs_f64(now_s));
             clock
         };
-        assert_eq!(frame(998.0, 0.5, false).taken(998.0), None, "the map of a checkpoint");
-        frame(1000.0, 8.5, true);
-        let clock = frame(1002.0, 9.0, true);
+        assert_eq!(FrameClock::default().taken(998.0), None, "the map of a checkpoint");
+        frame(1000.0, 8.5);
+        let clock = frame(1002.0, 9.0);
         assert_eq!(clock.taken(1001.0), Some(Instant::from_secs_f64(8.0)), "the first one was late");
         assert_eq!(clock.taken(999.0), None);
     }

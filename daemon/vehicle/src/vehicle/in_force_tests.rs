@@ -1,7 +1,7 @@
 //! The content in force that the link reports is that which the vehicle obeys, also after a restart.
 
 use super::Vehicle;
-use crate::{Durable, MapUpdate};
+use crate::{Durable, MapChanges};
 use proptest::prelude::*;
 use scenecast_config::Config;
 use scenecast_core::Area;
@@ -27,10 +27,7 @@ fn reported(vehicle: &Vehicle) -> PerSlot<Option<Slot>> {
 
 /// Shows the vehicle a map of two labels in an epoch.
 fn see(vehicle: &mut Vehicle, epoch: u8) {
-    let (layers, perplexity) = (Default::default(), Vec::new());
-    let update =
-        MapUpdate { t_s: 0.0, epoch, cells: Vec::new(), layers, perplexity, labels: 2, tree: None, seen: None };
-    vehicle.handle_map(&update, Instant::ZERO);
+    vehicle.handle_changes(&MapChanges::of_labels(epoch, 2, Vec::new()), Instant::ZERO);
     vehicle.handle_persisted();
 }
 

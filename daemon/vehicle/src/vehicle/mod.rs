@@ -24,9 +24,9 @@ pub use durable::{Durable, KeptKeys, LostOrders};
 pub use evidence::{Evidence, MappedFrame};
 pub use storing::VehicleDisk;
 
+use super::changes::MapChanges;
 use super::failsafe::FailsafePolicy;
-use super::foreign::{ForeignUpdate, LabelChanges};
-use super::mapper::{MapUpdate, SharedExemplars};
+use super::mapper::SharedExemplars;
 use super::navigator::Navigator;
 use super::registration::{RegisteredFrame, RegistrationMonitor};
 use super::steering::Steering;
@@ -45,7 +45,7 @@ use scenecast_protocol::wire::{EquipmentFaults, UtcHours};
 use slots::Weights;
 use std::collections::VecDeque;
 use std::time::Duration;
-use storing::{Storing, WaitingMap};
+use storing::Storing;
 
 /// Metres and seconds of use of the limits after which they are stored again.
 const RECORD_INTERVAL: (f64, f64) = (50.0, 60.0);
@@ -234,55 +234,34 @@ impl Vehicle {
         self.guidance.handle_travel(metres);
     }
 
-    /// The scene model has a new map. New labels are stored before any of them is sent, so that a
-    /// restart cannot give one another meaning.
-    pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
-        if self.storing.covers(update) {
-            return self.publish(update, now);
-        }
-        let is_other = update.epoch != self.durable.epoch;
-        let is_more = is_other || update.labels > self.durable.labels;
-        if is_more {
-            (self.durable.epoch, self.durable.labels) = (update.epoch, update.labels);
-        }
-        if let Some(part) = self.storing.hold_map(update, now) {
-            self.publish(&part, now);
+    /// A producer has changed the map. New labels are stored before any of them is sent, so that a restart cannot give one
+    /// another meaning. Returns the label whose name is refused, because it has another one already.
+    pub fn handle_changes(&mut self, changes: &MapChanges, now: Instant) -> Option<u8> {
+        let is_more = changes.labels.as_ref().is_some_and(|labels| self.durable.claim(labels));
+        if !self.storing.holds_changes(changes, now) {
+            self.publish(changes, now);
         }
         // A refused state is given to the disk again at its time, not with each frame of the camera.
-        if is_more || !self.storing.is_refused() {
+        if is_more || self.is_waiting_for_labels() && !self.storing.is_refused() {
             self.outputs.push_back(VehicleOutput::Persist);
         }
-    }
-
-    /// Another program has changed cells, of labels or bands, and names of its classes. New labels are stored before any of
-    /// them is sent. Returns the label whose name is refused, because it has another one already.
-    pub fn handle_foreign(&mut self, update: &ForeignUpdate, now: Instant) -> Option<u8> {
-        self.publisher.handle_bands(&update.bands, self.codec, &mut self.link, now);
-        if let Some(changes) = &update.labels {
-            self.handle_changes(changes, now);
-        }
-        let mut refused = update.classes.iter().filter(|entry| !self.link.add_class(entry)).map(ClassEntry::label);
+        let mut refused = changes.classes.iter().filter(|entry| !self.link.add_class(entry)).map(ClassEntry::label);
         refused.next()
     }
 
-    fn handle_changes(&mut self, changes: &LabelChanges, now: Instant) {
-        let is_more = changes.labels > self.durable.labels;
-        self.durable.labels = self.durable.labels.max(changes.labels);
-        let is_waiting = self.publisher.handle_changes(changes, self.storing.labels(), &mut self.link, now);
-        self.guidance.handle_view(self.navigator.position().xy(), &[]);
-        // A refused state is given to the disk again at its time, not with each change.
-        if is_more || is_waiting && !self.storing.is_refused() {
-            self.outputs.push_back(VehicleOutput::Persist);
-        }
+    /// Whether labels wait for the disk.
+    fn is_waiting_for_labels(&self) -> bool {
+        self.storing.has_next_map() || self.publisher.is_waiting()
     }
 
-    fn publish(&mut self, update: &MapUpdate, now: Instant) {
-        self.publisher.handle_map(update, &mut self.link, now);
-        if update.tree.as_ref().is_some_and(|tree| self.weights.handle_tree(tree, update.labels)) {
+    fn publish(&mut self, changes: &MapChanges, now: Instant) {
+        self.publisher.handle_changes(changes, self.storing.labels(), self.codec, &mut self.link, now);
+        let Some(labels) = &changes.labels else { return };
+        if labels.tree.as_ref().is_some_and(|tree| self.weights.handle_tree(tree, labels.highest)) {
             self.guidance.replan();
             self.follow_utility();
         }
-        self.guidance.handle_view(self.navigator.position().xy(), &update.perplexity);
+        self.guidance.handle_view(self.navigator.position().xy(), &changes.perplexity);
     }
 
     /// Labels are numbered again from 1. The surface learns it by a new run of the link, before any of the new labels.
@@ -297,10 +276,11 @@ impl Vehicle {
 
     /// Takes the best exemplars of each label, the best first.
     pub fn handle_exemplars(&mut self, exemplars: SharedExemplars, now: Instant) {
-        if let Some(exemplars) = self.storing.hold_exemplars(exemplars) {
-            self.gallery.set_exemplars(exemplars);
-            self.serve_exemplars(now);
+        if self.is_waiting_for_labels() {
+            return self.storing.hold_exemplars(exemplars, now);
         }
+        self.gallery.set_exemplars(exemplars);
+        self.serve_exemplars(now);
     }
 
     fn serve_exemplars(&mut self, now: Instant) {
@@ -409,18 +389,15 @@ impl Vehicle {
 
     /// The host has stored [`Self::durable`]. Orders that waited for it are applied, and stored in their turn.
     pub fn handle_persisted(&mut self) {
-        let is_new_epoch = self.durable.epoch != self.storing.epoch();
-        let (decisions, map) = self.storing.handle_stored(self.durable.epoch, self.durable.labels);
-        if let Some(WaitingMap { update, exemplars, at }) = map {
-            if is_new_epoch {
-                self.begin_epoch(at);
-            }
-            self.publish(&update, at);
-            if let Some(exemplars) = exemplars {
-                self.handle_exemplars(exemplars, at);
-            }
+        let (decisions, next_map) = self.storing.handle_stored(self.durable.epoch, self.durable.labels);
+        if let Some((map, at)) = next_map {
+            self.begin_epoch(at);
+            self.publish(&map, at);
         }
         self.publisher.handle_stored(self.storing.labels(), &mut self.link);
+        if let Some((exemplars, at)) = self.storing.take_exemplars() {
+            self.handle_exemplars(exemplars, at);
+        }
         self.report_decisions(decisions);
         if let Some(next) = self.durable.keys.next() {
             self.link.keep_next_key(&next);

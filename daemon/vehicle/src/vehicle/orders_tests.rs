@@ -1,7 +1,7 @@
 //! Random orders, maps, drift and silence: no waypoint leads out of the fence, into a keep-out or beyond a limit.
 
 use super::{Vehicle, VehicleOutput};
-use crate::{Durable, MapUpdate, Navigator};
+use crate::{Durable, MapChanges, Navigator};
 use proptest::prelude::*;
 use scenecast_config::Config;
 use scenecast_core::Area;
@@ -15,7 +15,6 @@ use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Intent, ModeReason, VehicleMode};
 use scenecast_worlds::{Motion, stretches_outside};
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 const AREA: Area = Area { west: 0.0, south: 0.0, east: 40.0, north: 30.0 };
@@ -74,10 +73,7 @@ impl Sea {
         let cells = (-6..6).flat_map(|dy| (-6..6).map(move |dx| (x + dx, y + dy)));
         let mut known: Vec<(Cell, u8)> = self.vehicle.cells().collect();
         known.extend(cells.map(|(x, y)| (Cell::new(x, y), patch(x, y))));
-        let (layers, perplexity) = (BTreeMap::new(), Vec::new());
-        let update =
-            MapUpdate { t_s: 0.0, epoch: 0, cells: known, layers, perplexity, labels: 4, tree: None, seen: None };
-        self.vehicle.handle_map(&update, self.now);
+        self.vehicle.handle_changes(&MapChanges::of_labels(0, 4, known), self.now);
         self.vehicle.handle_persisted();
     }
 

@@ -4,16 +4,14 @@ use super::bands::Bands;
 use super::evidence::{Evidence, EvidenceByCell};
 use super::frame_clock::FrameClock;
 use super::storing::WaitingCells;
-use crate::{LabelChanges, MapUpdate};
+use crate::{LabelChanges, MapChanges};
 use scenecast_config::Debounce;
 use scenecast_protocol::directive::{CellBand, Settings};
 use scenecast_protocol::link::VehicleLink;
-use scenecast_protocol::map::{
-    Cell, LabelGrid, LabelTree, LayerDescriptor, LayerId, LayerMask, LayerSource, UNEXPLORED,
-};
+use scenecast_protocol::map::{Cell, LabelGrid, LabelTree, LayerId, LayerMask, LayerSource, UNEXPLORED};
 use scenecast_protocol::map_codec::{Codec, Stride};
 use scenecast_protocol::time::Instant;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// The limit of the backlog, in seconds of the budget, where the operator orders coarse to fine and the
@@ -52,8 +50,8 @@ pub(super) struct MapPublisher {
     frames: FrameClock,
     /// Whether cells have lost their labels, as those of another program may.
     has_erased: bool,
-    /// Layers of the scene model.
-    layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
+    /// Levels of the scene model's layers.
+    layers: BTreeMap<LayerId, LabelGrid>,
     labels: u8,
     explored: u32,
     configured: MapSelection,
@@ -64,29 +62,29 @@ pub(super) struct MapPublisher {
     tree_at: Option<Instant>,
     /// Bands of another program and their layers, which the vehicle adds when the first of their cells comes.
     bands: Bands,
-    /// Cells with labels of another program that are not on the disk yet.
+    /// Cells whose labels are not on the disk yet.
     waiting: WaitingCells,
 }
 
 impl MapPublisher {
-    /// The map of the scene model and its version, which grows with each change.
+    /// The whole map and its version, which grows with each change.
     pub(super) fn seen(&self) -> (&LabelGrid, u64) {
         (&self.map, self.version)
     }
 
-    /// Why a cell has its label, if a camera frame of this run gave it.
     /// The times of camera frames.
     pub(super) fn frames(&self) -> FrameClock {
         self.frames
     }
 
+    /// Why a cell has its label, if a camera frame of this run gave it.
     pub(super) fn evidence(&self, cell: Cell) -> Option<&Evidence> {
         self.evidence.get(cell)
     }
 
-    /// The highest label so far.
+    /// The highest label so far that may be sent.
     pub(super) fn labels(&self) -> u8 {
-        self.labels
+        self.waiting.allowed(self.labels)
     }
 
     /// The number of cells that have a label.
@@ -137,33 +135,36 @@ impl MapPublisher {
         link.select_layers(self.bands.added_to(selected));
     }
 
-    /// Takes the scene model's map and gives the link its part of it.
-    pub(super) fn handle_map(&mut self, update: &MapUpdate, link: &mut VehicleLink, now: Instant) {
-        self.labels = update.labels;
-        self.tree = update.tree.clone().or_else(|| self.tree.take());
-        self.explored = update.cells.iter().filter(|&&(_, label)| label != UNEXPLORED).count() as u32;
-        let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label);
-        let changed: BTreeSet<Cell> = changed.map(|(cell, _)| *cell).collect();
-        self.version += u64::from(!changed.is_empty());
-        self.frames.handle(update, now);
-        self.evidence.handle_change(&changed, update, self.frames);
-        self.has_erased |= (self.explored as usize) < update.cells.len();
-        // A band in the place of a built-in layer has its cells to itself.
-        let own = update.layers.iter().filter(|(id, _)| !self.bands.has(**id));
-        self.layers = own.map(|(&id, cells)| (id, cells.clone())).collect();
-        self.publish_scene(link, now);
-    }
-
-    /// Takes changed cells of the labels of another program and gives the link those whose labels are on the disk, which are
-    /// labels up to `stored`. Returns whether the others wait for [`Self::handle_stored`].
+    /// Takes changes of a producer and gives the link those cells whose labels are on the disk, which are labels up to `stored`.
+    /// The others wait for [`Self::handle_stored`].
     pub(super) fn handle_changes(
         &mut self,
-        changes: &LabelChanges,
+        changes: &MapChanges,
         stored: u8,
+        codec: Codec,
         link: &mut VehicleLink,
         now: Instant,
-    ) -> bool {
-        self.labels = changes.labels;
+    ) {
+        if let Some(frame) = &changes.frame {
+            self.frames.handle(frame, now);
+            self.evidence.handle_frame(frame, self.frames);
+        }
+        if let Some(labels) = &changes.labels {
+            self.handle_labels(labels, stored, link, now);
+        }
+        for (&id, levels) in &changes.layers {
+            // A band in the place of a built-in layer has its cells to itself.
+            if !self.bands.has(id) {
+                self.layers.entry(id).or_default().extend(levels.iter().copied());
+                self.set_levels(id, levels.iter().copied(), link, now);
+            }
+        }
+        self.handle_bands(changes, codec, link, now);
+    }
+
+    fn handle_labels(&mut self, changes: &LabelChanges, stored: u8, link: &mut VehicleLink, now: Instant) {
+        self.labels = changes.highest;
+        self.tree = changes.tree.clone().or_else(|| self.tree.take());
         self.waiting.begin(stored);
         let mut has_changed = false;
         for &(cell, label) in &changes.cells {
@@ -177,13 +178,17 @@ impl MapPublisher {
             changes.cells.iter().copied().partition(|&(_, label)| label <= stored);
         self.waiting.add(&later, now);
         self.publish_cells(now_sent, link, now);
+    }
+
+    /// Whether cells wait for the disk.
+    pub(super) fn is_waiting(&self) -> bool {
         self.waiting.is_any()
     }
 
     /// Labels up to `stored` are on the disk: gives the link the cells that waited for that.
     pub(super) fn handle_stored(&mut self, stored: u8, link: &mut VehicleLink) {
         if !self.waiting.is_any() {
-            return;
+            return self.waiting.begin(stored);
         }
         let now = self.waiting.at();
         match self.waiting.release(stored) {
@@ -203,23 +208,17 @@ impl MapPublisher {
         }
     }
 
-    /// Takes changed levels of bands and gives them to the link.
-    pub(super) fn handle_bands(
-        &mut self,
-        bands: &[(LayerDescriptor, Vec<(Cell, u8)>)],
-        codec: Codec,
-        link: &mut VehicleLink,
-        now: Instant,
-    ) {
-        for (descriptor, levels) in bands {
+    fn handle_bands(&mut self, changes: &MapChanges, codec: Codec, link: &mut VehicleLink, now: Instant) {
+        for (descriptor, levels) in &changes.bands {
             let (Some(id), is_new) = self.bands.add(descriptor, codec, link) else { continue };
             if is_new {
                 self.select(link);
             }
             // The cells that the scene model gave to the layer until now.
-            let others = self.layers.remove(&id).unwrap_or_default().into_iter().map(|(cell, _)| (cell, f64::NAN));
+            let others = self.layers.remove(&id).unwrap_or_default();
+            let others: Vec<_> = others.iter().map(|(cell, _)| (cell, f64::NAN)).collect();
             let changed = self.bands.take(id, levels);
-            self.set_layer(id, others.chain(changed).collect(), link, now);
+            self.set_band(id, others.into_iter().chain(changed).collect(), link, now);
         }
     }
 
@@ -230,6 +229,7 @@ impl MapPublisher {
         self.explored = 0;
         self.layers.clear();
         (self.tree, self.tree_at) = (None, None);
+        self.waiting = WaitingCells::default();
         self.version += 1;
         self.publish_bands(link, now);
     }
@@ -245,31 +245,41 @@ impl MapPublisher {
     /// Where only coarse cells are selected, finer ones that the link already has stay up to date, so that no cell on the
     /// operator's map is older than it looks.
     fn publish_scene(&self, link: &mut VehicleLink, now: Instant) {
-        let is_ready = |&(cell, label): &(Cell, u8)| self.is_sent(Some(link.map()), cell) && self.waiting.allows(label);
+        let is_ready =
+            |&(cell, label): &(Cell, u8)| self.is_sent(Some(link.map()), cell) && label == self.waiting.allowed(label);
         let mut cells: Vec<(Cell, u8)> = self.map.iter().filter(is_ready).collect();
         if self.has_erased {
             let gone = link.map().iter().filter(|&(cell, _)| self.map.get(cell) == UNEXPLORED);
             cells.extend(gone.map(|(cell, _)| (cell, UNEXPLORED)));
         }
         link.set_map(cells, now);
-        for (&id, cells) in &self.layers {
-            self.set_layer(id, cells.clone(), link, now);
+        for (&id, levels) in &self.layers {
+            self.set_levels(id, levels.iter(), link, now);
         }
     }
 
-    /// Gives the link every band whole, which takes long for a large one: changes alone come by [`Self::handle_bands`].
+    /// Gives the link every band whole, which takes long for a large one.
     fn publish_bands(&self, link: &mut VehicleLink, now: Instant) {
         for (id, cells) in self.bands.all() {
-            self.set_layer(id, cells, link, now);
+            self.set_band(id, cells, link, now);
         }
     }
 
-    /// Gives the link the selected ones of the cells of a layer, and those that are no longer known.
-    fn set_layer(&self, id: LayerId, mut cells: Vec<(Cell, f64)>, link: &mut VehicleLink, now: Instant) {
-        let sent = link.layers().find(|layer| layer.id() == id).map(LayerSource::target);
+    /// Gives the link the selected ones of the cells of a band, and those that are no longer known.
+    fn set_band(&self, id: LayerId, mut cells: Vec<(Cell, f64)>, link: &mut VehicleLink, now: Instant) {
+        let sent = sent_of(link, id);
         cells.retain(|&(cell, quantity)| quantity.is_nan() || self.is_sent(sent, cell));
         if !cells.is_empty() {
             link.set_layer(id, cells, now);
+        }
+    }
+
+    /// Gives the link the selected ones of the cells of a layer.
+    fn set_levels(&self, id: LayerId, cells: impl Iterator<Item = (Cell, u8)>, link: &mut VehicleLink, now: Instant) {
+        let sent = sent_of(link, id);
+        let cells: Vec<(Cell, u8)> = cells.filter(|&(cell, _)| self.is_sent(sent, cell)).collect();
+        if !cells.is_empty() {
+            link.set_levels(id, cells, now);
         }
     }
 
@@ -281,11 +291,17 @@ impl MapPublisher {
 
     /// Gives the link the tree of the labels if that is due.
     pub(super) fn push_tree(&mut self, link: &mut VehicleLink, now: Instant) {
-        if self.tree_at.is_none_or(|at| now.since(at) >= TREE_INTERVAL)
+        if !self.is_waiting()
+            && self.tree_at.is_none_or(|at| now.since(at) >= TREE_INTERVAL)
             && let Some(tree) = self.tree.take()
             && link.set_tree(&tree)
         {
             self.tree_at = Some(now);
         }
     }
+}
+
+/// What the link has of a layer.
+fn sent_of(link: &VehicleLink, id: LayerId) -> Option<&LabelGrid> {
+    link.layers().find(|layer| layer.id() == id).map(LayerSource::target)
 }

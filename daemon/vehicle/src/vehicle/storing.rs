@@ -1,6 +1,6 @@
 //! The part of the vehicle's state that waits for the disk, and the cells that are not sent before it is stored.
 
-use crate::{MapUpdate, SharedExemplars};
+use crate::{MapChanges, SharedExemplars};
 use scenecast_protocol::directive::{Slot, SlotId, SlotState};
 use scenecast_protocol::link::SlotInboxState;
 use scenecast_protocol::map::Cell;
@@ -30,14 +30,6 @@ pub(super) struct WaitingOrder {
     pub(super) at: Instant,
 }
 
-/// A map whose labels must be on the disk before they are sent, with the exemplars that belong to it.
-#[derive(Debug)]
-pub(super) struct WaitingMap {
-    pub(super) update: MapUpdate,
-    pub(super) exemplars: Option<SharedExemplars>,
-    pub(super) at: Instant,
-}
-
 /// A decision in force, and when it was made.
 pub(super) type UnreportedDecision = (SlotId, SlotState, Instant);
 
@@ -47,7 +39,10 @@ pub(super) struct Storing {
     orders: Vec<WaitingOrder>,
     /// Decisions in force that are reported once they are on the disk.
     decisions: Vec<UnreportedDecision>,
-    map: Option<WaitingMap>,
+    /// The map of the next epoch, and when it changed last.
+    next_map: Option<(MapChanges, Instant)>,
+    /// Exemplars that may be of labels that are not on the disk, and when they came.
+    exemplars: Option<(SharedExemplars, Instant)>,
     /// The epoch on the disk, and its highest label.
     epoch: u8,
     labels: u8,
@@ -117,40 +112,42 @@ impl Storing {
         inbox
     }
 
-    /// Whether every label of a map is on the disk.
-    pub(super) fn covers(&self, update: &MapUpdate) -> bool {
-        update.epoch == self.epoch && update.labels <= self.labels
-    }
-
-    /// Has a map wait in the place of an older one. Returns the part of it that may be sent at once: while the disk
-    /// refuses the new labels, their cells keep their last label or none.
-    pub(super) fn hold_map(&mut self, update: &MapUpdate, at: Instant) -> Option<MapUpdate> {
-        let exemplars = self.map.take().and_then(|map| map.exemplars);
-        self.map = Some(WaitingMap { update: update.clone(), exemplars, at });
-        let is_part_known = self.is_refused() && update.epoch == self.epoch && self.labels > 0;
-        is_part_known.then(|| {
-            let mut part = update.clone();
-            part.cells.retain(|&(_, label)| label <= self.labels);
-            (part.labels, part.tree) = (self.labels, None);
-            part
-        })
-    }
-
-    /// Has exemplars wait for the labels of the waiting map; gives them back if there is none.
-    pub(super) fn hold_exemplars(&mut self, exemplars: SharedExemplars) -> Option<SharedExemplars> {
-        match &mut self.map {
-            Some(map) => {
-                map.exemplars = Some(exemplars);
-                None
-            }
-            None => Some(exemplars),
+    /// Has changes wait if their labels belong to another epoch than the one on the disk; returns whether they do.
+    pub(super) fn holds_changes(&mut self, changes: &MapChanges, at: Instant) -> bool {
+        let is_next = changes.labels.as_ref().is_some_and(|labels| labels.epoch != self.epoch);
+        if is_next {
+            let (map, last) = self.next_map.get_or_insert_default();
+            map.then(changes);
+            *last = at;
         }
+        is_next
     }
 
-    /// The state with these labels is on the disk. Returns the decisions to report and the map to send.
-    pub(super) fn handle_stored(&mut self, epoch: u8, labels: u8) -> (Vec<UnreportedDecision>, Option<WaitingMap>) {
+    /// Whether the map of another epoch waits.
+    pub(super) fn has_next_map(&self) -> bool {
+        self.next_map.is_some()
+    }
+
+    /// Has exemplars wait.
+    pub(super) fn hold_exemplars(&mut self, exemplars: SharedExemplars, at: Instant) {
+        self.exemplars = Some((exemplars, at));
+    }
+
+    /// The exemplars that have waited.
+    pub(super) fn take_exemplars(&mut self) -> Option<(SharedExemplars, Instant)> {
+        self.exemplars.take()
+    }
+
+    /// The state with these labels is on the disk. Returns the decisions to report, and the map with which another epoch begins.
+    pub(super) fn handle_stored(
+        &mut self,
+        epoch: u8,
+        labels: u8,
+    ) -> (Vec<UnreportedDecision>, Option<(MapChanges, Instant)>) {
+        let is_next = epoch != self.epoch;
         (self.epoch, self.labels, self.retry_at) = (epoch, labels, None);
-        (std::mem::take(&mut self.decisions), self.map.take())
+        let next = if is_next { self.next_map.take() } else { None };
+        (std::mem::take(&mut self.decisions), next)
     }
 
     /// The disk has refused the state.
@@ -178,10 +175,10 @@ impl Storing {
 /// Cells that are remembered one by one; beyond them the whole map is given to the link again.
 const MAX_CELLS: usize = 1 << 16;
 
-/// The cells of another program's map that wait for the disk.
+/// The cells whose labels wait for the disk.
 #[derive(Debug, Default)]
 pub(super) struct WaitingCells {
-    /// The highest label on the disk; `None` before another program's labels came.
+    /// The highest label on the disk; `None` before labels came.
     stored: Option<u8>,
     cells: Vec<Cell>,
     is_overflown: bool,
@@ -215,9 +212,9 @@ impl WaitingCells {
         self.at
     }
 
-    /// Whether a label may be sent.
-    pub(super) fn allows(&self, label: u8) -> bool {
-        self.stored.is_none_or(|stored| label <= stored)
+    /// This label, or else the highest that may be sent.
+    pub(super) fn allowed(&self, label: u8) -> u8 {
+        self.stored.map_or(label, |stored| label.min(stored))
     }
 
     /// The cells that waited for labels up to `stored`; `None` if they are too many to be known.
@@ -235,12 +232,12 @@ mod tests {
     #[test]
     fn too_many_cells_become_the_whole_map() {
         let mut waiting = WaitingCells::default();
-        assert!(waiting.allows(9) && !waiting.is_any());
+        assert!(waiting.allowed(9) == 9 && !waiting.is_any());
         waiting.begin(4);
-        assert!(waiting.allows(4) && !waiting.allows(5));
+        assert_eq!([4, 5].map(|label| waiting.allowed(label)), [4, 4]);
         waiting.add(&[(Cell::new(1, 2), 5)], Instant::ZERO);
         assert_eq!(waiting.release(5), Some(vec![Cell::new(1, 2)]));
-        assert!(waiting.allows(5) && !waiting.is_any());
+        assert!(waiting.allowed(5) == 5 && !waiting.is_any());
         let many: Vec<(Cell, u8)> = (0..40_000).map(|x| (Cell::new(x, 0), 6)).collect();
         waiting.add(&many, Instant::ZERO);
         waiting.add(&many, Instant::ZERO);

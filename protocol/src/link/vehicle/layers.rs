@@ -2,7 +2,7 @@
 
 use super::config::OversizedChunk;
 use super::content::{Carried, Part, VehicleContent};
-use crate::map::{Cell, LayerId, LayerMask, LayerSource, StateSource};
+use crate::map::{LayerId, LayerMask, LayerSource, StateSource};
 use crate::schedule::{BackgroundStream, BitBudget};
 use crate::time::Instant;
 use crate::wire::{ChunkKind, FrameBuilder, room_for_payload};
@@ -53,16 +53,6 @@ impl<S: StateSource> VehicleContent<S> {
     /// As [`LayerSource::set_coarse_limit`], for each layer.
     pub(super) fn set_coarse_layers(&mut self, after_bytes: Option<usize>) {
         self.layers.iter_mut().for_each(|l| l.source.set_coarse_limit(after_bytes));
-    }
-
-    /// Sets quantities of cells of a layer, if it is replicated; returns whether the layer has changed.
-    pub(super) fn set_layer(
-        &mut self,
-        id: LayerId,
-        cells: impl IntoIterator<Item = (Cell, f64)>,
-        now: Instant,
-    ) -> bool {
-        self.layer_mut(id).is_some_and(|layer| layer.source.set(cells, now) > 0)
     }
 
     pub(super) fn layer_mut(&mut self, id: LayerId) -> Option<&mut LayerOut> {

@@ -154,7 +154,14 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// Sets quantities of cells of a layer, in its descriptor's unit, if it is replicated.
     pub fn set_layer(&mut self, id: LayerId, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
-        if self.content.set_layer(id, cells, now) {
+        if self.content.layer_mut(id).is_some_and(|layer| layer.source.set(cells, now) > 0) {
+            self.repeater.forget();
+        }
+    }
+
+    /// As [`Self::set_layer`], with levels; 0 for a cell that is not known.
+    pub fn set_levels(&mut self, id: LayerId, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) {
+        if self.content.layer_mut(id).is_some_and(|layer| layer.source.set_levels(cells, now) > 0) {
             self.repeater.forget();
         }
     }

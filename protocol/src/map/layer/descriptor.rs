@@ -4,6 +4,7 @@ use super::Decimal;
 use super::set::DEPTH;
 use crate::map::{MAX_LABEL, TextPart, UNEXPLORED};
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// A layer of the map: one quantity a cell, in few levels. Level 0 is "not known" in every layer, because the coder of maps
 /// takes it for a cell that nobody has seen.
@@ -179,7 +180,7 @@ impl LayerDescriptor {
 
     /// The level of a quantity for a cell that has been of level `held`; 0 if it lies off the scale.
     pub fn level(&self, quantity: f64, held: u8) -> u8 {
-        if self.bounds(held).is_some_and(|bounds| self.is_still(quantity, held, bounds)) {
+        if self.kept_by(held).is_some_and(|range| range.contains(&quantity)) {
             return held;
         }
         let steps = (quantity - self.offset.value()) / self.scale.value();
@@ -192,10 +193,12 @@ impl LayerDescriptor {
         if is_on_scale { self.steps.below(steps, self.levels.saturating_sub(1)) + 1 } else { UNEXPLORED }
     }
 
-    fn is_still(&self, quantity: f64, held: u8, (low, high): (f64, f64)) -> bool {
-        let width = self.steps.begin_and_width(held - 1).1 * self.scale.value();
+    /// The quantities with which a cell of this level keeps it; `None` if the level means "not known".
+    pub fn kept_by(&self, level: u8) -> Option<Range<f64>> {
+        let (low, high) = self.bounds(level)?;
+        let width = self.steps.begin_and_width(level - 1).1 * self.scale.value();
         let margin = width * Self::HYSTERESIS;
-        (low - margin..high + margin).contains(&quantity)
+        Some(low - margin..high + margin)
     }
 
     /// Fingerprint of all of it ([`TextPart::digest_of`]).

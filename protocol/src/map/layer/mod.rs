@@ -9,7 +9,7 @@ pub use chunk::{Decimal, LayerChunk};
 pub use descriptor::{LayerDescriptor, Palette, Quantity, Spread, Steps, UpperEnd};
 pub use set::{BUILT_IN_LAYERS, BuiltInLayer, LayerId, LayerMask, LayerSet};
 
-use super::{Cell, LabelGrid, MapSource, Replica, StateReplica, StateSource, TextPart, TextSender};
+use super::{Cell, LabelGrid, MapSource, Replica, StateReplica, StateSource, TextPart, TextSender, UNEXPLORED};
 use crate::map_codec::Codec;
 use crate::time::Instant;
 use std::fmt;
@@ -56,7 +56,15 @@ impl LayerSource {
         let held = self.levels.target();
         let level = |(cell, quantity)| (cell, self.descriptor.level(quantity, held.get(cell)));
         let levels: Vec<(Cell, u8)> = cells.into_iter().map(level).collect();
-        self.levels.set(levels, now)
+        self.set_levels(levels, now)
+    }
+
+    /// Sets levels of cells, 0 or one that the layer lacks for a cell that is not known; returns how many cells have another level
+    /// than before.
+    pub fn set_levels(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
+        let most = self.descriptor.levels;
+        let known = |(cell, level)| (cell, if level <= most { level } else { UNEXPLORED });
+        self.levels.set(cells.into_iter().map(known), now)
     }
 
     /// Sets the backlog above which coarse cells go first, as [`MapSource::set_coarse_limit`] does.

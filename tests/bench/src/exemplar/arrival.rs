@@ -16,7 +16,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_rehearsal::VirtualTime;
 use scenecast_surface::{LabelExemplars, RequestKind};
-use scenecast_vehicle::{Durable, MapUpdate};
+use scenecast_vehicle::{Durable, MapChanges};
 use serde::Serialize;
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
@@ -203,18 +203,8 @@ impl ExemplarBench {
             };
             (Cell::new(i % EDGE, i / EDGE), label)
         });
-        let (cells, layers, perplexity) = (cells.collect(), BTreeMap::new(), Vec::new());
-        let update = MapUpdate {
-            t_s: self.now.as_secs_f64(),
-            epoch: 0,
-            cells,
-            layers,
-            perplexity,
-            labels: LABELS,
-            tree: None,
-            seen: None,
-        };
-        self.vehicle.handle_map(&update, self.now);
+        let changes = MapChanges::of_labels(0, LABELS, cells.collect());
+        self.vehicle.handle_changes(&changes, self.now);
     }
 }
 

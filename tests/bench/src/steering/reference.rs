@@ -4,7 +4,7 @@ use scene_model::project::Pose;
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_rehearsal::Mission;
-use scenecast_vehicle::{Frame, Mapper};
+use scenecast_vehicle::{Frame, MapProducer, Mapper};
 use scenecast_worlds::View;
 
 /// The distance between the views as a share of their edges.
@@ -22,7 +22,6 @@ pub(super) fn labels_of(mission: &Mission, area: &Area) -> Result<LabelGrid, Use
     let navigator = mission.vehicle().navigator();
     let ((x, y), (east, north)) = (navigator.position().xy(), navigator.world().xy());
     let mut t_s = mission.now().as_secs_f64();
-    let mut cells = Vec::new();
     for (x_m, y_m) in places(area, camera.width_px, camera.height_px, camera.metres_per_pixel) {
         t_s += PAUSE_S;
         let (width_px, height_px, moment) = (camera.width_px, camera.height_px, (t_s * 1000.0) as u64);
@@ -30,10 +29,11 @@ pub(super) fn labels_of(mission: &Mission, area: &Area) -> Result<LabelGrid, Use
         let image = world.view(&View { x_m, y_m, heading_rad: 0.0, altitude_m, width_px, height_px, moment });
         let depth_m = world.depth_m(survey.depth_m, x_m, y_m) - altitude_m;
         let pose = Pose { x: x_m - east + x, y: y_m - north + y, z: -depth_m, yaw_rad: 0.0 };
-        cells = mapper.handle_frame(&Frame::flat(&image, pose, 1.0), t_s).cells;
+        mapper.handle_frame(&Frame::flat(&image, pose, 1.0), t_s);
     }
     let shift = |metres: f64| (metres / mission.cell_m()).round() as i32;
     let (right, up) = (shift(east - x), shift(north - y));
+    let cells = mapper.current().labels.map_or(Vec::new(), |labels| labels.cells);
     Ok(cells.into_iter().map(|(cell, label)| (Cell::new(cell.x + right, cell.y + up), label)).collect())
 }
 
