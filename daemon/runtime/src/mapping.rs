@@ -4,6 +4,7 @@ use super::journal::Folder;
 use super::restore::CheckpointFile;
 use crate::camera::{CameraFrame, FramePicture, ReadFrame};
 use scene_model::project::Pose;
+use scenecast_config::{AutopilotKind, Config};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Settings;
 use scenecast_sensors::{DepthError, ImageSize};
@@ -49,7 +50,18 @@ pub(super) struct MapperThread {
 }
 
 impl MapperThread {
-    pub(super) fn start(mut mapper: Mapper, keep: Keep) -> Result<Self, UserError> {
+    /// Starts the thread with a mapper, the settings in force, and the schedule of its checkpoints.
+    pub(super) fn start(
+        mut mapper: Mapper,
+        config: &Config,
+        settings: &Settings,
+        keep: Keep,
+    ) -> Result<Self, UserError> {
+        mapper.tune(settings);
+        if config.autopilot.kind != AutopilotKind::None {
+            // The odometry of an autopilot starts again with each run.
+            mapper.handle_gap();
+        }
         mapper.check_camera();
         let (orders, incoming) = mpsc::unbounded_channel();
         let (outgoing, mapped) = mpsc::channel(4);
@@ -255,10 +267,11 @@ mod tests {
         std::fs::create_dir_all(&in_the_way).unwrap();
         let image = dir.join("frame.png");
         RgbImage::from_fn(160, 120, |x, y| Rgb([x as u8, y as u8, (x * y % 31) as u8])).save(&image).unwrap();
-        let mapper = Mapper::new(&scenecast_config::load(None, &[]).unwrap(), None, 0, 1).unwrap();
+        let config = scenecast_config::load(None, &[]).unwrap();
+        let mapper = Mapper::new(&config, None, 0, 1).unwrap();
         let file = CheckpointFile::new(Folder::hold(&dir).unwrap());
         let keep = Keep { file, lineage: 1, every_s: 1.0, last_s: None, is_refused: false };
-        let mut thread = MapperThread::start(mapper, keep).unwrap();
+        let mut thread = MapperThread::start(mapper, &config, &Settings::default(), keep).unwrap();
         let mut reports = |t_s: f64| {
             let (x_m, y_m, depth_m, heading_rad, scale) = (0.0, 0.0, 4.0, 0.0, 1.0);
             let shot = FrameImage::File(image.clone());

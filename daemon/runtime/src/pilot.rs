@@ -1,12 +1,13 @@
 //! The configured autopilot and its port.
 
 use crate::port::{FromPort, Port};
-use scenecast_config::{AutopilotKind, Config};
-use scenecast_core::UserError;
+use scenecast_config::{AutopilotKind, Config, NavigationSource, survey_depth_m};
+use scenecast_core::{TangentPlane, UserError};
 use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
 use scenecast_drivers::autopilot::{Autopilot, Mavlink, Nmea};
-use scenecast_host::{FrameOutcome, PilotEvent};
+use scenecast_host::{Follower, FrameOutcome, PilotEvent, VehiclePilot};
 use scenecast_protocol::time::Instant;
+use scenecast_surface::position::Follow;
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -14,7 +15,7 @@ use std::time::Duration;
 pub type SimulatedAutopilot = fn(&Config, Instant) -> Box<dyn Autopilot>;
 
 /// The configured autopilot, if there is one.
-pub(super) fn autopilot(
+fn autopilot(
     config: &Config,
     simulated: Option<SimulatedAutopilot>,
     now: Instant,
@@ -37,6 +38,32 @@ pub(super) fn autopilot(
         },
         AutopilotKind::None => return Ok(None),
     }))
+}
+
+/// The configured autopilot of a vehicle with the frames in which it is told where to go, if there is one.
+pub(super) fn of_vehicle(
+    config: &Config,
+    simulated: Option<SimulatedAutopilot>,
+    now: Instant,
+) -> Result<Option<VehiclePilot>, UserError> {
+    let plane = config.mission.origin_deg.map(TangentPlane::new);
+    let measures = config.navigation.source == NavigationSource::Autopilot;
+    let depth_m = survey_depth_m(config);
+    let pilot = autopilot(config, simulated, now)?;
+    Ok(pilot.map(|pilot| VehiclePilot::new(pilot, plane, depth_m, now).measuring(measures)))
+}
+
+/// The configured autopilot of a surface, which follows the vehicle, if there is one.
+pub(super) fn of_surface(
+    config: &Config,
+    simulated: Option<SimulatedAutopilot>,
+    now: Instant,
+) -> Result<Option<Follower>, UserError> {
+    let vehicle = scenecast_config::vehicle_address(config)?;
+    let p = &config.position;
+    let follow = p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m));
+    let pilot = autopilot(config, simulated, now)?;
+    Ok(pilot.map(|pilot| Follower::new(pilot, follow, vehicle, now)))
 }
 
 /// The port to an autopilot, if there is one.

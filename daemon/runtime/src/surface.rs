@@ -12,13 +12,13 @@ use super::store::{ArchivedFile, SurfaceFiles};
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::report::report_reply;
-use scenecast_console::{Console, PendingRequest, bind, start};
-use scenecast_core::{LatLon, TangentPlane, UserError, utc_text, world_file};
-use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
+use scenecast_console::{Console, ConsoleListener, PendingRequest, bind, start};
+use scenecast_core::{LatLon, Principal, TangentPlane, UserError, utc_text, world_file};
+use scenecast_host::{FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::link::DropReason;
+use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::position::Follow;
 use scenecast_surface::state::ReplaySide;
 use scenecast_surface::{
     ClientRequest, CommandChange, LinkMeter, MapCaption, MissionFacts, Reply, SurfaceOutput, SurfaceRequest,
@@ -54,89 +54,34 @@ pub fn run_surface(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let mut config = load()?;
         name_surface(&mut config);
         keep_private();
-        let mut principals = Vec::new();
-        let listener = match &config.console.listen {
-            None => None,
-            Some(address) => {
-                let tokens = scenecast_config::load_tokens(&config)?;
-                principals.extend(tokens.iter().map(|t| t.principal.clone()));
-                let listener = bind(address.as_str(), "console.listen", tokens, &config.console.host).await?;
-                let origins = config.console.origins.iter().map(|origin| origin.as_str().to_owned()).collect();
-                Some(listener.with_origins(origins))
-            }
-        };
+        let listener = listen(&config).await?;
         warn_without_key(&config);
-        let authenticity = scenecast_config::authenticity(&config, Address::SURFACE)?;
-        let offers_key = authenticity.as_ref().is_some_and(|keys| keys.next.is_some());
-        let was_there = config.runtime.state_dir.exists();
-        let (mut files, clock) = SurfaceFiles::open(&config)?;
-        let profile = scenecast_drivers::modem::modem_of_process(&config, Address::SURFACE)?;
-        let mut surface = scenecast_surface::assemble(
-            &config,
-            authenticity,
-            scenecast_config::tuning_table(&config)?,
-            profile,
-            super::random_bits(),
-            clock.now(),
-        )?;
-        // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
-        let (stop, reload) = (Stop::new()?, Reload::new(load, &config)?);
-        let ros2 = SurfaceRos2::start(&config, &mut principals)?;
-        surface.set_principals(principals);
-        if let Some(relay) = relay(&config) {
-            surface.set_relay(relay);
-        }
-        if was_there || files.is_again() {
-            surface.assume_budget_spent(clock.now());
-        }
-        let console = listener.zip(config.console.listen.as_ref()).map(|(listener, address)| {
-            // Without a terminal the surface goes on.
-            let _ = writeln!(std::io::stdout(), "the operator's page is at http://{address} (end with Ctrl-C)");
-            start(listener)
-        });
-        files.begin(&mut surface, super::random_bits() as u32, config.mission.id, clock.now());
-        let id = files.store.memory().began().map_or(0, |began| began.id);
-        let facts = MissionFacts::new(&config, &profile, id.into(), config.runtime.time_scale);
-        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), clock.now());
-        let modem = ModemPort::open(&config, clock.now()).await?;
-        let instruments = Instruments::open(&config);
-        let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
-        let ports = Ports { modem, instruments, pilot: PilotPort::open(&config, autopilot.is_some()) };
-        let vehicle = scenecast_config::vehicle_address(&config)?;
-        let p = &config.position;
-        let follow = p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m));
-        let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
-        let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
-        let maps = MapFiles::start(config.runtime.state_dir.clone());
-        let (is_stale, reading) = (true, Arc::default());
-        let budget = configured_budget(&config);
-        let folder = config.runtime.state_dir.join("records");
-        let record =
-            SurfaceRecord::start(&config, &config.surface.name, &folder, offers_key, host.surface().log().last());
-        let shell = SurfaceShell {
-            host,
-            ports,
-            console,
-            ros2,
-            clock,
-            files,
-            maps,
-            facts,
-            meter,
-            record,
-            reading,
-            reload,
-            budget,
-            is_stale,
-        };
+        let (shell, stop) = SurfaceShell::start(&config, load, listener, simulated).await?;
         shell.run(stop).await
     })
+}
+
+/// The configured address of the page, with those who may use it.
+async fn listen(config: &Config) -> Result<Option<(ConsoleListener, Vec<Principal>)>, UserError> {
+    let Some(address) = &config.console.listen else { return Ok(None) };
+    let tokens = scenecast_config::load_tokens(config)?;
+    let principals = tokens.iter().map(|token| token.principal.clone()).collect();
+    let listener = bind(address.as_str(), "console.listen", tokens, &config.console.host).await?;
+    let origins = config.console.origins.iter().map(|origin| origin.as_str().to_owned()).collect();
+    Ok(Some((listener.with_origins(origins), principals)))
 }
 
 struct Ports {
     modem: ModemPort,
     instruments: Instruments,
     pilot: PilotPort,
+}
+
+impl Ports {
+    async fn open(config: &Config, has_autopilot: bool, now: Instant) -> Result<Self, UserError> {
+        let modem = ModemPort::open(config, now).await?;
+        Ok(Self { modem, instruments: Instruments::open(config), pilot: PilotPort::open(config, has_autopilot) })
+    }
 }
 
 /// Moves bytes, reads the clock, writes files and answers the page; the host makes all decisions.
@@ -161,6 +106,65 @@ struct SurfaceShell {
 }
 
 impl SurfaceShell {
+    /// Starts every part of the surface as it is configured.
+    async fn start(
+        config: &Config,
+        load: Load,
+        page: Option<(ConsoleListener, Vec<Principal>)>,
+        simulated: Option<SimulatedAutopilot>,
+    ) -> Result<(Self, Stop), UserError> {
+        let authenticity = scenecast_config::authenticity(config, Address::SURFACE)?;
+        let offers_key = authenticity.as_ref().is_some_and(|keys| keys.next.is_some());
+        let was_there = config.runtime.state_dir.exists();
+        let (mut files, clock) = SurfaceFiles::open(config)?;
+        let profile = scenecast_drivers::modem::modem_of_process(config, Address::SURFACE)?;
+        let (table, seed) = (scenecast_config::tuning_table(config)?, super::random_bits());
+        let mut surface = scenecast_surface::assemble(config, authenticity, table, profile, seed, clock.now())?;
+        // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
+        let (stop, reload) = (Stop::new()?, Reload::new(load, config)?);
+        let (listener, mut principals) = page.map_or((None, Vec::new()), |(page, users)| (Some(page), users));
+        let ros2 = SurfaceRos2::start(config, &mut principals)?;
+        surface.set_principals(principals);
+        if let Some(relay) = relay(config) {
+            surface.set_relay(relay);
+        }
+        if was_there || files.is_again() {
+            surface.assume_budget_spent(clock.now());
+        }
+        let console = listener.zip(config.console.listen.as_ref()).map(|(listener, address)| {
+            // Without a terminal the surface goes on.
+            let _ = writeln!(std::io::stdout(), "the operator's page is at http://{address} (end with Ctrl-C)");
+            start(listener)
+        });
+        files.begin(&mut surface, super::random_bits() as u32, config.mission.id, clock.now());
+        let id = files.store.memory().began().map_or(0, |began| began.id);
+        let facts = MissionFacts::new(config, &profile, id.into(), config.runtime.time_scale);
+        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s), clock.now());
+        let follower = pilot::of_surface(config, simulated, clock.now())?;
+        let ports = Ports::open(config, follower.is_some(), clock.now()).await?;
+        let host = SurfaceHost::new(surface, modem_station(config, Address::SURFACE, profile)?, follower);
+        let folder = config.runtime.state_dir.join("records");
+        let record =
+            SurfaceRecord::start(config, &config.surface.name, &folder, offers_key, host.surface().log().last());
+        let shell = Self {
+            host,
+            ports,
+            console,
+            ros2,
+            clock,
+            files,
+            maps: MapFiles::start(config.runtime.state_dir.clone()),
+            facts,
+            meter,
+            record,
+            reading: Arc::default(),
+            reload,
+            budget: configured_budget(config),
+            is_stale: true,
+        };
+        Ok((shell, stop))
+    }
+
     async fn run(mut self, mut stop: Stop) -> Result<(), UserError> {
         let mut publish = tokio::time::interval(PUBLISH_INTERVAL);
         publish.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);

@@ -5,30 +5,29 @@ use super::durable::{Checkpoint, DiskWatch, Keeper, StartedRun};
 use super::equipment::SensorFaults;
 use super::journal::Folder;
 use super::labels::{self, FromLabels, LabelThread, move_the_vehicle};
-use super::mapping::{Disagreement, FromMapper, Mapped, MapperThread, ToMapper};
+use super::mapping::{Disagreement, FromMapper, Keep, Mapped, MapperThread, ToMapper};
 use super::modem::{self, ModemPort, warn_without_key};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::record::VehicleRecord;
 use super::restore::{Start, start};
 use super::ros2::{RosSensors, VehicleRos2};
 use super::stop::{Load, Reload, Stop, configured_budget, hold_hang_up, keep_private};
-use crate::camera::{Camera, CameraFrame, LiveCamera, RecordedCamera};
+use crate::camera::{Camera, CameraFrame};
 use crate::port::FromPort;
-use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource, survey_depth_m};
-use scenecast_core::{Area, TangentPlane, UserError};
+use scenecast_config::{Config, LabelSource};
+use scenecast_core::{Area, UserError};
 use scenecast_files::{Recording, configured_recording, read_class_names};
-use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
+use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, modem_station};
 use scenecast_labels::ImagePose;
 use scenecast_protocol::directive::{SlotId, SlotState};
+use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::LayerSet;
-use scenecast_vehicle::{MapChanges, MapProducer};
+use scenecast_protocol::time::Instant;
+use scenecast_vehicle::{ForeignMap, MapChanges, MapProducer, Vehicle};
 use std::time::Duration;
 
 /// Maximum time between two calls of the host.
 const MAX_SLEEP: Duration = Duration::from_secs(1);
-
-/// Mission time that is assumed to pass between two runs of a live camera, seconds.
-const RESTART_S: f64 = 2.0;
 
 /// Runs the vehicle until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -37,97 +36,31 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let config = load()?;
         keep_private();
         warn_without_key(&config);
-        let address = scenecast_config::vehicle_address(&config)?;
-        let authenticity = scenecast_config::authenticity(&config, address)?;
-        let dir = config.runtime.state_dir.as_path();
-        let Start { run, mut mapper, keep, labels } = start(&config, dir)?;
-        let StartedRun { keeper, durable, is_again, is_stored } = run;
-        let clock = Clock::new(config.runtime.time_scale);
-        let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
-        let recording = configured_recording(&config)?;
-        for note in recording.iter().flat_map(|recording| &recording.notes) {
-            tracing::warn!("camera.source: {note}");
-        }
-        let area = survey_area(&config, recording.as_ref())?;
-        let mut vehicle = scenecast_vehicle::assemble(
-            &config,
-            authenticity,
-            profile,
-            area,
-            durable,
-            super::random_bits(),
-            clock.now(),
-        )?;
-        // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
-        let stop = Stop::new()?;
-        if is_again {
-            vehicle.assume_budget_spent(clock.now());
-        }
-        if !is_stored {
-            vehicle.assume_start_refused(clock.now());
-        }
-        let is_recorded = recording.is_some();
-        // Without a camera, poses of a navigation source move the vehicle.
-        let is_live = config.camera.source.is_live() || !is_recorded && config.navigation.source.is_live();
-        let sensors = RosSensors::new(&config)?;
-        let camera = match is_live {
-            // The time since the end of the former run is unknown.
-            true => Camera::Live(Box::new(LiveCamera::start(
-                &config,
-                mapper.last_s().map_or(0.0, |s| s + RESTART_S),
-                &sensors,
-            )?)),
-            false => Camera::Recorded(Box::new(RecordedCamera::new(recording, clock, mapper.last_s()))),
-        };
-        mapper.tune(vehicle.settings());
-        if config.autopilot.kind != AutopilotKind::None {
-            // The odometry of an autopilot starts again with each run.
-            mapper.handle_gap();
-        }
-        let mapper = MapperThread::start(mapper, keep)?;
-        let labels = labels.map(|(map, keep)| {
-            let names = config.labels.classes.as_deref().map(read_class_names).transpose()?;
-            let names = names.map_or(Vec::new(), |item| item.classes);
-            let feeds = labels::open(&config, &map, &|topic| labels::topic(&sensors, topic))?;
-            LabelThread::start(map, &names, feeds, keep, clock)
-        });
-        let labels = labels.transpose()?;
-        let modem = ModemPort::open(&config, clock.now()).await?;
-        let station = modem_station(&config, address, profile)?;
-        let reload = Reload::new(load, &config)?;
-        let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
-        let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some()) };
-        let plane = config.mission.origin_deg.map(TangentPlane::new);
-        let measures = config.navigation.source == NavigationSource::Autopilot;
-        let depth_m = survey_depth_m(&config);
-        let pilot = autopilot.map(|a| VehiclePilot::new(a, plane, depth_m, clock.now()).measuring(measures));
-        let mut host = VehicleHost::new(vehicle, station, pilot);
-        if is_recorded && camera.is_over() {
-            host.handle_camera_end();
-        }
-        let disk = DiskWatch::new(dir);
-        let ros2 = VehicleRos2::start(&config)?;
-        let is_foreign = config.labels.source != LabelSource::SceneModel;
-        let labels = Labels { thread: labels, is_foreign, move_vehicle: move_the_vehicle(&config) };
-        let (faults, disagreement) = (SensorFaults::default(), Disagreement::default());
-        let record = VehicleRecord::start(&config, &dir.join("records"), config.runtime.time_scale);
-        let shell = VehicleShell {
-            host,
-            camera,
-            mapper,
-            labels,
-            ports,
-            ros2,
-            clock,
-            keeper,
-            disk,
-            faults,
-            disagreement,
-            record,
-            reload,
-        };
+        let (shell, stop) = VehicleShell::start(&config, load, simulated).await?;
         shell.run(stop).await
     })
+}
+
+/// The vehicle's role at the start of a run, with the state that was restored.
+fn vehicle_of(
+    config: &Config,
+    restored: StartedRun<Folder>,
+    modem: ModemProfile,
+    recording: Option<&Recording>,
+    now: Instant,
+) -> Result<(Vehicle, Keeper<Folder>), UserError> {
+    let StartedRun { keeper, durable, is_again, is_stored } = restored;
+    let authenticity = scenecast_config::authenticity(config, scenecast_config::vehicle_address(config)?)?;
+    let area = survey_area(config, recording)?;
+    let seed = super::random_bits();
+    let mut vehicle = scenecast_vehicle::assemble(config, authenticity, modem, area, durable, seed, now)?;
+    if is_again {
+        vehicle.assume_budget_spent(now);
+    }
+    if !is_stored {
+        vehicle.assume_start_refused(now);
+    }
+    Ok((vehicle, keeper))
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, UserError> {
@@ -141,6 +74,12 @@ struct Ports {
     pilot: PilotPort,
 }
 
+impl Ports {
+    async fn open(config: &Config, has_autopilot: bool, now: Instant) -> Result<Self, UserError> {
+        Ok(Self { modem: ModemPort::open(config, now).await?, pilot: PilotPort::open(config, has_autopilot) })
+    }
+}
+
 /// The thread of other programs' labels and bands.
 struct Labels {
     thread: Option<LabelThread>,
@@ -148,6 +87,25 @@ struct Labels {
     is_foreign: bool,
     /// Whether images of another program move the vehicle.
     move_vehicle: bool,
+}
+
+impl Labels {
+    /// Starts the thread with the map of the last checkpoint; without one there is no such program.
+    fn start(
+        config: &Config,
+        map: Option<(ForeignMap, Keep)>,
+        sensors: &RosSensors,
+        clock: Clock,
+    ) -> Result<Self, UserError> {
+        let thread = map.map(|(map, keep)| {
+            let names = config.labels.classes.as_deref().map(read_class_names).transpose()?;
+            let names = names.map_or(Vec::new(), |item| item.classes);
+            let feeds = labels::open(config, &map, &|topic| labels::topic(sensors, topic))?;
+            LabelThread::start(map, &names, feeds, keep, clock)
+        });
+        let is_foreign = config.labels.source != LabelSource::SceneModel;
+        Ok(Self { thread: thread.transpose()?, is_foreign, move_vehicle: move_the_vehicle(config) })
+    }
 }
 
 /// Moves bytes, reads the clock and syncs files; the host makes all decisions.
@@ -168,6 +126,53 @@ struct VehicleShell {
 }
 
 impl VehicleShell {
+    /// Starts every part of the vehicle as it is configured.
+    async fn start(
+        config: &Config,
+        load: Load,
+        simulated: Option<SimulatedAutopilot>,
+    ) -> Result<(Self, Stop), UserError> {
+        let address = scenecast_config::vehicle_address(config)?;
+        let dir = config.runtime.state_dir.as_path();
+        let Start { run, mapper, keep, labels } = start(config, dir)?;
+        let clock = Clock::new(config.runtime.time_scale);
+        let profile = scenecast_drivers::modem::modem_of_process(config, address)?;
+        let recording = configured_recording(config)?;
+        let (vehicle, keeper) = vehicle_of(config, run, profile, recording.as_ref(), clock.now())?;
+        // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
+        let stop = Stop::new()?;
+        let (is_recorded, sensors) = (recording.is_some(), RosSensors::new(config)?);
+        let camera = Camera::start(config, recording, &sensors, clock, mapper.last_s())?;
+        let mapper = MapperThread::start(mapper, config, vehicle.settings(), keep)?;
+        let labels = Labels::start(config, labels, &sensors, clock)?;
+        let pilot = pilot::of_vehicle(config, simulated, clock.now())?;
+        let ports = Ports::open(config, pilot.is_some(), clock.now()).await?;
+        let reload = Reload::new(load, config)?;
+        let mut host = VehicleHost::new(vehicle, modem_station(config, address, profile)?, pilot);
+        if is_recorded && camera.is_over() {
+            host.handle_camera_end();
+        }
+        let ros2 = VehicleRos2::start(config)?;
+        let (disk, faults, disagreement) = (DiskWatch::new(dir), SensorFaults::default(), Disagreement::default());
+        let record = VehicleRecord::start(config, &dir.join("records"), config.runtime.time_scale);
+        let shell = Self {
+            host,
+            camera,
+            mapper,
+            labels,
+            ports,
+            ros2,
+            clock,
+            keeper,
+            disk,
+            faults,
+            disagreement,
+            record,
+            reload,
+        };
+        Ok((shell, stop))
+    }
+
     /// Tells how long one pass of the survey takes, where an autopilot carries it out.
     fn tell_pass(&self) {
         let (metres, time) = self.host.vehicle().pass();

@@ -5,13 +5,16 @@ mod live;
 mod pose_feed;
 mod recorded;
 
-pub(crate) use live::LiveCamera;
-pub(crate) use recorded::RecordedCamera;
+use live::LiveCamera;
+use recorded::RecordedCamera;
 
+use crate::clock::Clock;
+use crate::ros2::RosSensors;
 use image::RgbImage;
 use scene_model::project::View;
+use scenecast_config::Config;
 use scenecast_core::UserError;
-use scenecast_files::RecordedFrame;
+use scenecast_files::{RecordedFrame, Recording};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_sensors::{
     BitDepth, CalibrationError, CameraTally, DecodeError, DepthError, DepthMessage, SensorPose, Sight,
@@ -123,7 +126,31 @@ pub(crate) enum Camera {
     Live(Box<LiveCamera>),
 }
 
+/// Mission time that is assumed to pass between two runs of a live camera, seconds: the time since the end of the former run
+/// is unknown.
+const RESTART_S: f64 = 2.0;
+
 impl Camera {
+    /// Starts the configured camera after the last frame of an earlier run, if there was one.
+    pub(crate) fn start(
+        config: &Config,
+        recording: Option<Recording>,
+        sensors: &RosSensors,
+        clock: Clock,
+        last_s: Option<f64>,
+    ) -> Result<Self, UserError> {
+        for note in recording.iter().flat_map(|recording| &recording.notes) {
+            tracing::warn!("camera.source: {note}");
+        }
+        // Without a camera, poses of a navigation source move the vehicle.
+        let is_live = config.camera.source.is_live() || recording.is_none() && config.navigation.source.is_live();
+        if !is_live {
+            return Ok(Self::Recorded(Box::new(RecordedCamera::new(recording, clock, last_s))));
+        }
+        let start_s = last_s.map_or(0.0, |s| s + RESTART_S);
+        Ok(Self::Live(Box::new(LiveCamera::start(config, start_s, sensors)?)))
+    }
+
     /// Waits until [`Self::poll_frame`] may have a frame. Cancel-safe.
     pub(crate) async fn wait(&mut self) {
         match self {
