@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use scenecast_scoring::{AnnotatedScene, MeanScore, Method, Trial};
+use scenecast_worlds::scoring::{AnnotatedScene, MeanScore, Method, Trial};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();

@@ -10,7 +10,7 @@ use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
-use scenecast_scoring::mutual_information_nats;
+use scenecast_worlds::scoring::mutual_information_nats;
 use scenecast_worlds::{Patches, patches};
 
 fn main() {

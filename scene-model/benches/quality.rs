@@ -7,7 +7,7 @@
 mod workload;
 
 use scene_model::topics::{SceneConfig, SceneModel};
-use scenecast_scoring::mutual_information_nats;
+use scenecast_worlds::scoring::mutual_information_nats;
 use workload::{Workload, XorShiftRng};
 
 const SWEEPS: u32 = 30;

@@ -7,8 +7,8 @@ use std::error::Error;
 use image::GrayImage;
 use scene_model::topics::FlatCell;
 use scene_model::{DownCamera, Pose, SceneConfig, SceneModel, WordConfig, WordExtractor};
-use scenecast_scoring::{AnnotatedScene, Method, Trial, mutual_information_nats};
 use scenecast_worlds::patches;
+use scenecast_worlds::scoring::{AnnotatedScene, Method, Trial, mutual_information_nats};
 
 const WIDTH: u32 = 480;
 const HEIGHT: u32 = 320;

@@ -5,7 +5,7 @@ use scene_model::publish::LabelBook;
 use scene_model::random::mix;
 use scene_model::topics::{FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
-use scenecast_scoring::mutual_information_nats;
+use scenecast_worlds::scoring::mutual_information_nats;
 use scenecast_worlds::{Patches, patches};
 
 const CELL_PX: f32 = 25.0;

@@ -22,17 +22,15 @@ const IO_CRATES: [&str; 14] = [
 ];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 15] = [
+const SANS_IO: [&str; 13] = [
     "scenecast-core",
     "scenecast-drivers",
-    "scenecast-fourier",
     "scenecast-host",
     "scenecast-labels",
     "scenecast-messages",
     "scenecast-sensors",
     "scenecast-protocol",
     "scenecast-registration",
-    "scenecast-scoring",
     "scenecast-surface",
     "scenecast-vehicle",
     "scenecast-worlds",
@@ -41,12 +39,11 @@ const SANS_IO: [&str; 15] = [
 ];
 
 /// Crates that no vehicle carries.
-const ASHORE: [&str; 10] = [
+const ASHORE: [&str; 9] = [
     "scenecast-bench",
     "scenecast-console",
     "scenecast-modem-sim",
     "scenecast-rehearsal",
-    "scenecast-scoring",
     "scenecast-tests",
     "scenecast-tools",
     "scenecast-training",

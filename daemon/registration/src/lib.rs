@@ -9,6 +9,7 @@ mod camera_image;
 mod compass;
 mod consensus;
 mod correlate;
+mod fourier;
 mod geometry;
 mod graph;
 #[cfg(test)]

@@ -8,7 +8,7 @@ use scene_model::topics::{FlatCell, coord_of};
 use scenecast_core::UserError;
 use scenecast_files::{finite_number, read_classes};
 use scenecast_protocol::map::Rect;
-use scenecast_scoring::{Annotations, LabelGrid, SceneScore, score};
+use scenecast_worlds::scoring::{Annotations, LabelGrid, SceneScore, score};
 use std::collections::BTreeMap;
 use std::path::Path;
 

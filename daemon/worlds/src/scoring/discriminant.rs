@@ -7,8 +7,8 @@ use scene_model::words::{
 };
 use std::collections::BTreeMap;
 
-use crate::annotations::Annotations;
-use crate::baselines::cluster_centres;
+use super::annotations::Annotations;
+use super::baselines::cluster_centres;
 
 /// The minimum number of annotated cells of a class that directions are learnt from.
 pub const MIN_CLASS_CELLS: u64 = 20;
@@ -213,8 +213,8 @@ fn leading(within: DMatrix<f64>, between: &DMatrix<f64>, count: usize) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::patches;
     use image::GrayImage;
-    use scenecast_worlds::patches;
 
     /// The statistics of a drawn sea floor with its habitats as classes, those in `ignore` left out.
     fn statistics(seed: u64, ignore: &[u8]) -> ClassStatistics {

@@ -1,13 +1,11 @@
 //! Places the frames of a real sequence one after the other, and prints their distance from the given poses.
 //!
-//! `cargo run --release -p scenecast-registration --example skerki -- FOLDER`, where `FOLDER` has `poses_estimated.csv`
+//! `cargo run --release -p scenecast-tools --example skerki -- FOLDER`, where `FOLDER` has `poses_estimated.csv`
 //! and its frames. Dead reckoning, compass and altitude are the given ones with errors. Pixels stand for metres.
-
-#![allow(clippy::disallowed_methods, reason = "an example reads files")]
 
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_registration::{CameraImage, FrameInput, Registrar};
-use scenecast_scoring::{PointPair, RigidFit, rms_distance};
+use scenecast_worlds::scoring::{PointPair, RigidFit, rms_distance};
 use std::path::Path;
 
 /// A frame with its given pose.

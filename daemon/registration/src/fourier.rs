@@ -1,14 +1,14 @@
 //! Fourier transforms of planes.
 //!
-//! A crate of its own: the transforms are generic code, which would be compiled again, for half a minute of the processor, in each crate
-//! and test that names them.
+//! Only this module names the transforms: they are generic code, which would be compiled again, for half a minute of the processor, in each
+//! crate that names them.
 
-pub use rustfft::num_complex::Complex32;
+pub(crate) use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
 /// Transforms of planes of one size. Spectra have columns as rows, which saves two transpositions.
-pub struct PlaneFft {
+pub(crate) struct PlaneFft {
     columns: usize,
     rows: usize,
     /// Along rows and along columns.
@@ -20,8 +20,7 @@ pub struct PlaneFft {
 
 impl PlaneFft {
     /// Transforms of planes of `columns` x `rows`, at least one each.
-    #[must_use]
-    pub fn new(columns: usize, rows: usize) -> Self {
+    pub(crate) fn new(columns: usize, rows: usize) -> Self {
         let mut planner = FftPlanner::new();
         let forward = [planner.plan_fft_forward(columns), planner.plan_fft_forward(rows)];
         let inverse = [planner.plan_fft_inverse(columns), planner.plan_fft_inverse(rows)];
@@ -30,18 +29,16 @@ impl PlaneFft {
         Self { columns, rows, forward, inverse, scratch: vec![zero; scratch], turned: vec![zero; columns * rows] }
     }
 
-    #[must_use]
-    pub fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.columns
     }
 
-    #[must_use]
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
     /// Replaces a plane, row by row, by its spectrum. Panics if it has another size.
-    pub fn transform(&mut self, plane: &mut [Complex32]) {
+    pub(crate) fn transform(&mut self, plane: &mut [Complex32]) {
         self.forward[0].process_with_scratch(plane, &mut self.scratch);
         transpose(plane, &mut self.turned, self.columns);
         self.forward[1].process_with_scratch(&mut self.turned, &mut self.scratch);
@@ -49,7 +46,7 @@ impl PlaneFft {
     }
 
     /// Replaces a spectrum by its plane, times the number of pixels. Panics if it has another size.
-    pub fn restore(&mut self, spectrum: &mut [Complex32]) {
+    pub(crate) fn restore(&mut self, spectrum: &mut [Complex32]) {
         self.inverse[1].process_with_scratch(spectrum, &mut self.scratch);
         transpose(spectrum, &mut self.turned, self.rows);
         self.inverse[0].process_with_scratch(&mut self.turned, &mut self.scratch);
@@ -57,8 +54,7 @@ impl PlaneFft {
     }
 
     /// The spectra of the real and the imaginary part of a plane, from the spectrum of the plane.
-    #[must_use]
-    pub fn separated(&self, spectrum: &[Complex32]) -> [Vec<Complex32>; 2] {
+    pub(crate) fn separated(&self, spectrum: &[Complex32]) -> [Vec<Complex32>; 2] {
         let (columns, rows) = (self.columns, self.rows);
         let mut parts = [Vec::with_capacity(spectrum.len()), Vec::with_capacity(spectrum.len())];
         for u in 0..columns {
@@ -83,6 +79,29 @@ fn transpose(from: &[Complex32], to: &mut [Complex32], columns: usize) {
                 for column in left..(left + 16).min(columns) {
                     to[column * rows + row] = from[row * columns + column];
                 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_real_planes_share_a_transform() {
+        let mut fft = PlaneFft::new(48, 32);
+        let value = |i: usize, k: usize| ((i * k + i / 5) % 17) as f32 - 8.0;
+        let both: Vec<Complex32> = (0..48 * 32).map(|i| Complex32::new(value(i, 7), value(i, 3))).collect();
+        let mut spectrum = both.clone();
+        fft.transform(&mut spectrum);
+        for (part, k) in fft.separated(&spectrum).iter_mut().zip([7, 3]) {
+            fft.restore(part);
+            for (i, number) in part.iter().enumerate() {
+                assert!(
+                    (number.re / (48.0 * 32.0) - value(i, k)).abs() < 1e-3 && number.im.abs() < 1.0,
+                    "{i}: {number}"
+                );
             }
         }
     }

@@ -1,12 +1,11 @@
-//! Scores label maps against expert annotations and tracks against true ones, and trains vocabularies. Offline work: no vehicle needs it, and it
-//! does no IO.
+//! Scores label maps against expert annotations and tracks against true ones, and trains vocabularies.
 //!
 //! On a small scene, mutual information alone is misleading: any map made of patches has some mutual information with
 //! any annotation made of patches. [`score`] therefore also computes a spatial null model, and the excess over it.
 //!
 //! ```
 //! use image::GrayImage;
-//! use scenecast_scoring::{AnnotatedScene, Method, Trial};
+//! use scenecast_worlds::scoring::{AnnotatedScene, Method, Trial};
 //!
 //! let world = scenecast_worlds::patches(3, 240, 180, 40, 4);
 //! let classes = GrayImage::from_raw(world.width, world.height, world.truth).ok_or("wrong size")?;

@@ -1,7 +1,7 @@
 //! The baselines of the scene model: k-means on colours and on word histograms, with k-means++ seeding (Arthur and Vassilvitskii,
 //! SODA 2007).
 
-use crate::annotations::{Annotations, LabelGrid};
+use super::annotations::{Annotations, LabelGrid};
 use image::RgbImage;
 use scene_model::random::CounterRng;
 use scene_model::words::{Word, cie_lab};

@@ -1,8 +1,8 @@
 //! A trial: a comparison of the scene model with the baselines on an annotated image, and the training of its vocabulary.
 
-use crate::annotations::{AnnotationError, Annotations, LabelGrid};
-use crate::baselines::{mean_lab_labels, pooled_word_labels};
-use crate::mutual_information::{SceneScore, score};
+use super::annotations::{AnnotationError, Annotations, LabelGrid};
+use super::baselines::{mean_lab_labels, pooled_word_labels};
+use super::mutual_information::{SceneScore, score};
 use image::{GrayImage, RgbImage};
 use scene_model::habitats::{Habitats, measure};
 use scene_model::project::{DownCamera, Observation, Pose};
@@ -270,7 +270,7 @@ pub fn median(values: &[f64]) -> f64 {
 ///
 /// ```
 /// use scene_model::words::{WordConfig, WordExtractor};
-/// use scenecast_scoring::train_vocabulary;
+/// use scenecast_worlds::scoring::train_vocabulary;
 ///
 /// let site = || (1..4).map(|seed| (scenecast_worlds::patches(seed, 120, 90, 20, 5).image, 25.0));
 /// let mut extractor = WordExtractor::from_measures(train_vocabulary(&WordConfig::default(), site));
@@ -289,8 +289,8 @@ pub fn train_vocabulary<I: Iterator<Item = (RgbImage, f32)>>(config: &WordConfig
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::patches;
     use image::Rgb;
-    use scenecast_worlds::patches;
 
     #[test]
     fn scene_model_finds_more_of_a_reef_than_the_baselines() {

@@ -30,14 +30,14 @@ impl Annotations {
     ///
     /// ```
     /// use image::{GrayImage, Luma};
-    /// use scenecast_scoring::Annotations;
+    /// use scenecast_worlds::scoring::Annotations;
     ///
     /// let classes = GrayImage::from_fn(40, 20, |x, _| Luma([if x < 20 { 3 } else { 255 }]));
     /// let annotations = Annotations::new(&classes, (40, 20), 10.0, &[255])?;
     /// assert_eq!(annotations.size(), (4, 2));
     /// // Four annotated cells, one class.
     /// assert_eq!(annotations.cells(), Some((4, 1)));
-    /// # Ok::<(), scenecast_scoring::AnnotationError>(())
+    /// # Ok::<(), scenecast_worlds::scoring::AnnotationError>(())
     /// ```
     pub fn new(labels: &GrayImage, size: (u32, u32), cell_px: f32, ignore: &[u8]) -> Result<Self, AnnotationError> {
         if labels.dimensions() != size {

@@ -5,7 +5,7 @@
 //! any annotation made of patches. The null model is the mean over the same map flipped in 3 ways and shifted on a
 //! torus by 12 large distances. The excess over it is due to the scene.
 
-use crate::annotations::{Annotations, LabelGrid};
+use super::annotations::{Annotations, LabelGrid};
 use std::collections::BTreeMap;
 
 /// The agreement of two labellings, whatever their numbering.
@@ -25,7 +25,7 @@ pub struct MutualInformation {
 /// hyperparameters.
 ///
 /// ```
-/// use scenecast_scoring::mutual_information_nats;
+/// use scenecast_worlds::scoring::mutual_information_nats;
 ///
 /// // Four labels under other names: the entropy of four equal shares.
 /// let score = mutual_information_nats((0..100).map(|cell| (cell % 4, 9 - cell % 4)));
@@ -88,7 +88,7 @@ impl MutualInformation {
     /// labels.
     ///
     /// ```
-    /// use scenecast_scoring::mutual_information_nats;
+    /// use scenecast_worlds::scoring::mutual_information_nats;
     ///
     /// // Two labels for each class: every label is pure, every class is split.
     /// let score = mutual_information_nats((0..80).map(|cell| (cell % 8, cell % 4)));
