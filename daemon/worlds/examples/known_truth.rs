@@ -1,6 +1,6 @@
 //! How close the label map comes to a known truth: mutual information by the number of sweeps, and against two baselines.
 //!
-//! `cargo run -p scene-model --example known_truth`
+//! `cargo run -p scenecast-worlds --example known_truth`
 
 use std::error::Error;
 

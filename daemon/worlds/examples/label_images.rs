@@ -1,6 +1,6 @@
 //! Labels all images of a folder with one scene model, so that a letter means the same ground in every image.
 //!
-//! `cargo run -p scene-model --example label_images -- DIR`; without a folder it labels three procedural sea floors.
+//! `cargo run -p scenecast-worlds --example label_images -- DIR`; without a folder it labels three procedural sea floors.
 
 use std::collections::BTreeMap;
 use std::error::Error;

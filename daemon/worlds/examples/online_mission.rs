@@ -1,6 +1,6 @@
 //! A survey of a procedural sea floor: each frame is labelled as it arrives, and a power cut in the middle costs no label.
 //!
-//! `cargo run -p scene-model --example online_mission`
+//! `cargo run -p scenecast-worlds --example online_mission`
 
 use std::error::Error;
 

@@ -1,6 +1,6 @@
 //! Word extraction from frames of 640 x 480 pixels: frames a second on one core.
 //!
-//! `cargo bench -p scene-model --bench words`
+//! `cargo bench -p scenecast-worlds --bench words`
 #![allow(missing_docs)]
 
 use divan::Bencher;

@@ -1,9 +1,10 @@
 //! Mutual information with the true labels of the synthetic workload over 8 seeds: at the true positions, and at
 //! positions displaced by a Gaussian of half a cell.
 //!
-//! `cargo bench -p scene-model --bench quality`
+//! `cargo bench -p scenecast-worlds --bench quality`
 #![allow(missing_docs, unreachable_pub)]
 
+#[path = "../../../scene-model/benches/workload/mod.rs"]
 mod workload;
 
 use scene_model::topics::{SceneConfig, SceneModel};

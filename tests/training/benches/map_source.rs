@@ -1,6 +1,6 @@
 //! Time and memory of a vehicle with a large map to choose its next chunk.
 //!
-//! `cargo bench -p scenecast-protocol --bench map_source`
+//! `cargo bench -p scenecast-training --bench map_source`
 #![allow(clippy::disallowed_methods)]
 
 use scenecast_protocol::map::{Cell, MapSource, StateSource};

@@ -1,6 +1,6 @@
 //! Scores on real imagery: the defaults and the baselines over a folder of images with annotations in `*_label.png`.
 //!
-//! `cargo bench -p scene-model --bench imagery -- DIR [SEEDS]`; `scenecast scene score` is the same with more options.
+//! `cargo bench -p scenecast-worlds --bench imagery -- DIR [SEEDS]`; `scenecast scene score` is the same with more options.
 #![allow(missing_docs)]
 
 use std::path::{Path, PathBuf};

@@ -1,6 +1,7 @@
 //! The CPU time of a mission of 20 minutes: 600 frames of 640 x 480 pixels over a procedural sea floor, extraction included.
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
 
+#[path = "../../../scene-model/benches/cpu/mod.rs"]
 mod cpu;
 
 use std::collections::BTreeMap;
