@@ -1,6 +1,7 @@
-//! Keys, each described once in the tables of [`crate::sections`], and the bounds of a key.
+//! Keys, each described once in the tables beside this file.
 
-use crate::Config;
+use super::Config;
+use crate::rule::Rule;
 use crate::setting::Setting;
 use toml::Value;
 
@@ -110,15 +111,15 @@ macro_rules! section {
         }
 
         impl $name {
-            pub(crate) const SECTION: $crate::key::Section = $crate::key::Section {
+            pub(crate) const SECTION: $crate::sections::key::Section = $crate::sections::key::Section {
                 name: stringify!($section),
                 doc: concat!($($section_doc),*),
-                keys: &[$($crate::key::Key {
+                keys: &[$($crate::sections::key::Key {
                     name: concat!(stringify!($section), ".", stringify!($field)),
                     rule: $rule,
-                    roles: &[$($crate::key::Role::$role),*],
+                    roles: &[$($crate::sections::key::Role::$role),*],
                     doc: concat!($($doc),*),
-                    operations: $crate::key::Operations::of::<$type>(
+                    operations: $crate::sections::key::Operations::of::<$type>(
                         |config, member, value, rule| {
                             $crate::setting::Setting::set(&mut config.$section.$field, member, value, rule)
                         },
@@ -131,26 +132,3 @@ macro_rules! section {
 }
 
 pub(crate) use section;
-
-/// The bounds of a key; each type uses those that concern it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rule {
-    /// The least and the greatest number.
-    pub range: (f64, f64),
-    /// Unit of the numbers; empty without one.
-    pub unit: &'static str,
-    /// Kinds of port, as in `serial:DEVICE:BAUD`.
-    pub ports: &'static [&'static str],
-}
-
-/// No bounds besides those of the type.
-pub(crate) const ANY: Rule = Rule { range: (f64::MIN, f64::MAX), unit: "", ports: &[] };
-
-/// Numbers from `low` to `high`.
-pub(crate) const fn range(low: f64, high: f64, unit: &'static str) -> Rule {
-    Rule { range: (low, high), unit, ..ANY }
-}
-
-pub(crate) const fn ports(kinds: &'static [&'static str]) -> Rule {
-    Rule { ports: kinds, ..ANY }
-}
