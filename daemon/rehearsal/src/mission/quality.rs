@@ -1,7 +1,7 @@
 //! The quality of both maps of a mission over time, layer by layer and in coarse blocks.
 
 use super::{MapInformation, Mission};
-use crate::fidelity::Meter;
+use crate::meter::Meter;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerId, LayerReplica, UNEXPLORED};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;

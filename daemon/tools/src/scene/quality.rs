@@ -1,7 +1,7 @@
 //! Annotated classes of places or pixels, and the agreement of a model's labels with them.
 
 use super::LabelledMap;
-use super::run_report::around;
+use super::extent::around;
 use super::words_file::{LineFault, Lines};
 use image::{GrayImage, Luma};
 use scene_model::topics::{FlatCell, coord_of};
