@@ -1,7 +1,11 @@
 //! The records of both ends of a mission, on the clock of the surface.
 
-use super::map::MapHistory;
+mod map;
+
+pub(crate) use map::ShownMap;
+
 use crate::layer_text::layer_of_text;
+use map::MapHistory;
 use scenecast_core::UserError;
 use scenecast_files::{
     FrameTimes, MissionClock, MissionSpeed, RecordedMessage, StateTime, mission_records, read_record,
@@ -48,17 +52,17 @@ pub(crate) struct Timeline {
 pub(crate) struct StateText {
     pub(crate) nanos: u64,
     pub(crate) json: String,
-    pub(super) head: StateHead,
+    pub(crate) head: StateHead,
 }
 
 /// The time of a state, and what the time line needs of it.
 #[derive(Debug, Deserialize)]
-pub(super) struct StateHead {
+pub(crate) struct StateHead {
     now_s: f64,
     mission: MissionHead,
     #[serde(default)]
     link: LinkHead,
-    pub(super) vehicles: Vec<Loops>,
+    pub(crate) vehicles: Vec<Loops>,
 }
 
 /// The numbers of frames in both directions, which begin again with each process of the surface.
@@ -83,15 +87,15 @@ struct MissionHead {
 
 /// The loops that a vehicle has closed.
 #[derive(Debug, Deserialize)]
-pub(super) struct Loops {
-    pub(super) id: u8,
-    pub(super) name: String,
-    pub(super) registration: Option<Closed>,
+pub(crate) struct Loops {
+    pub(crate) id: u8,
+    pub(crate) name: String,
+    pub(crate) registration: Option<Closed>,
 }
 
 #[derive(Debug, Deserialize)]
-pub(super) struct Closed {
-    pub(super) closed: u16,
+pub(crate) struct Closed {
+    pub(crate) closed: u16,
 }
 
 /// How many frames an end has sent, and what became of those that it heard.
@@ -132,7 +136,7 @@ impl FrameCounts {
 #[derive(Debug, Default)]
 pub(crate) struct Known {
     /// The name for people; empty where no message has it.
-    pub(super) name: String,
+    pub(crate) name: String,
     pub(crate) map: MapHistory,
     pub(crate) exemplars: Vec<(u64, Exemplar)>,
     /// When each frame came in: at a surface of those of the vehicle, at a vehicle of those of the surface.

@@ -69,7 +69,7 @@ impl MapHistory {
     }
 
     /// Adds what a later record of the same end says, its times moved.
-    pub(super) fn add(&mut self, later: Self, moved: impl Fn(u64) -> u64) {
+    pub(crate) fn add(&mut self, later: Self, moved: impl Fn(u64) -> u64) {
         self.descriptors.extend(later.descriptors);
         let changes = later.changes.into_iter();
         self.changes.extend(changes.map(|change| Change { nanos: moved(change.nanos), ..change }));
