@@ -1,9 +1,11 @@
 //! Time as an argument: the crate reads no clock. Also an estimate of the peer's clock relative to ours.
 
-use crate::wire::Stamp;
 use std::collections::VecDeque;
 use std::ops::{Add, Sub};
 use std::time::Duration;
+
+/// Bits of a clock reading in milliseconds; it wraps every 4 h 39 min.
+const CLOCK_BITS: u32 = 24;
 
 /// A moment on the host's monotonic clock, in microseconds since any fixed origin of the host's choosing.
 ///
@@ -42,6 +44,11 @@ impl Instant {
         self.0 as f64 / 1e6
     }
 
+    /// The reading of a clock in a stamp: milliseconds, low 24 bits.
+    pub(crate) fn clock_ms(self) -> u32 {
+        (self.0 / 1000) as u32 & ((1 << CLOCK_BITS) - 1)
+    }
+
     /// Time since `earlier`, zero if it lies in the future.
     #[must_use]
     pub fn since(self, earlier: Self) -> Duration {
@@ -76,6 +83,14 @@ impl Sub<Duration> for Instant {
     }
 }
 
+/// The time in microseconds by the clock that showed `clock_ms`, as near to `near_us` as possible.
+fn unwrap_clock(clock_ms: u32, near_us: i64) -> i64 {
+    let turn = 1_000_i64 << CLOCK_BITS;
+    let at = i64::from(clock_ms) * 1000;
+    let turns = (near_us - at + turn / 2).div_euclid(turn);
+    at + turns * turn
+}
+
 /// The offset of the peer's clock. The error is at most half the difference between the two propagation times.
 ///
 /// A frame that was late, or is a copy of an earlier one, makes the peer's clock look slow. Therefore the greatest of
@@ -95,7 +110,7 @@ impl ClockMap {
         let began = (now - ago).as_micros() as i64;
         // Unwrapped near the known offset, so that a wrapped clock is not taken for a slow one.
         let near = began + self.measured_us.back().copied().unwrap_or_default();
-        self.measured_us.push_back(Stamp::unwrap_clock(clock_ms, near) - began);
+        self.measured_us.push_back(unwrap_clock(clock_ms, near) - began);
         if self.measured_us.len() > Self::KEPT {
             self.measured_us.pop_front();
         }
@@ -113,19 +128,20 @@ impl ClockMap {
 
     /// Our time, nearest to `now`, at which the peer's clock showed `clock_ms`.
     pub fn to_ours(&self, clock_ms: u32, now: Instant) -> Instant {
-        let theirs = Stamp::unwrap_clock(clock_ms, now.as_micros() as i64 + self.ahead_us());
+        let theirs = unwrap_clock(clock_ms, now.as_micros() as i64 + self.ahead_us());
         Instant::from_micros((theirs - self.ahead_us()).max(0) as u64)
     }
 
     /// The reading of the peer's clock at `at`: milliseconds, low 24 bits.
     pub fn to_theirs(&self, at: Instant) -> u32 {
-        Stamp::clock(Instant::from_micros((at.as_micros() as i64 + self.ahead_us()).rem_euclid(1000 << 24) as u64))
+        Instant::from_micros((at.as_micros() as i64 + self.ahead_us()).rem_euclid(1000 << 24) as u64).clock_ms()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn times_convert_to_the_peers_clock_and_back() {
@@ -136,5 +152,14 @@ mod tests {
         let earlier = now - Duration::from_secs(60);
         assert_eq!(map.to_theirs(now), 1_500);
         assert_eq!(map.to_ours(map.to_theirs(earlier), now), earlier);
+    }
+
+    proptest! {
+        #[test]
+        fn a_clock_unwraps_to_the_nearest_moment(at in 0u64..1 << 50, drift_us in -8_000_000_000i64..8_000_000_000) {
+            let shown = Instant::from_micros(at).clock_ms();
+            let near = at as i64 + drift_us;
+            prop_assert_eq!(unwrap_clock(shown, near), at as i64 / 1000 * 1000);
+        }
     }
 }

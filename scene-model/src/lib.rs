@@ -27,9 +27,11 @@
 //!   once a minute <------- SceneModel::save         everything as bytes; SceneModel::load continues from them
 //! ```
 //!
-//! The same loop in code, over three frames of a procedural sea floor in place of a camera:
+//! The same loop in code, with three drawn frames in place of a camera:
 //!
 //! ```
+//! use image::{Rgb, RgbImage};
+//! use scene_model::random::mix;
 //! use scene_model::{DownCamera, LabelBook, Pose, SceneConfig, SceneModel, WordConfig, WordExtractor};
 //!
 //! let mut extractor = WordExtractor::new(&WordConfig::default());
@@ -39,8 +41,9 @@
 //! let mut map = Vec::new();
 //!
 //! for second in 0..3 {
-//!     // A frame of 320 x 240 pixels, 3 m above the ground and 1 m further east each second.
-//!     let image = scenecast_worlds::patches(second, 320, 240, 60, 5).image;
+//!     // A frame of 320 x 240 pixels, 3 m above stones of half a metre and 1 m further east each second.
+//!     let stone = |x: u32, y: u32| mix(1000 * (u64::from(x / 50) + 2 * second) + u64::from(y / 50)) as u8;
+//!     let image = RgbImage::from_fn(320, 240, |x, y| Rgb([stone(x, y), 90, 60]));
 //!     let pose = Pose { x: second as f64, y: 0.0, z: -10.0, yaw_rad: 0.0 };
 //!     let camera = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
 //!
@@ -57,7 +60,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `examples/` has complete programs: `label_images` for a folder of images, `online_mission` for a vehicle with a
+//! `daemon/worlds/examples/` has complete programs: `label_images` for a folder of images, `online_mission` for a vehicle with a
 //! checkpoint and a restart, `known_truth` for scores against a known map.
 //!
 //! # Units

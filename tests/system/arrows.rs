@@ -22,17 +22,15 @@ const IO_CRATES: [&str; 14] = [
 ];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 15] = [
+const SANS_IO: [&str; 13] = [
     "scenecast-core",
     "scenecast-drivers",
-    "scenecast-fourier",
     "scenecast-host",
     "scenecast-labels",
     "scenecast-messages",
     "scenecast-sensors",
     "scenecast-protocol",
     "scenecast-registration",
-    "scenecast-scoring",
     "scenecast-surface",
     "scenecast-vehicle",
     "scenecast-worlds",
@@ -41,17 +39,24 @@ const SANS_IO: [&str; 15] = [
 ];
 
 /// Crates that no vehicle carries.
-const ASHORE: [&str; 10] = [
+const ASHORE: [&str; 9] = [
     "scenecast-bench",
     "scenecast-console",
     "scenecast-modem-sim",
     "scenecast-rehearsal",
-    "scenecast-scoring",
     "scenecast-tests",
     "scenecast-tools",
     "scenecast-training",
     "scenecast-worlds",
     "sim-channel",
+];
+
+/// Dependencies of tests alone that no arrow allows, each with its reason. None runs back up: the second crate does not need the first.
+const TEST_SUPPORT: [(&str, &str, &str); 4] = [
+    ("scenecast", "scenecast-tests", "what the tests of the whole system share"),
+    ("scenecast", "scenecast-training", "drawn label maps for the tests of `scenecast map`"),
+    ("scenecast-bench", "scenecast-tests", "what the tests of the whole system share"),
+    ("scenecast-vehicle", "scenecast-worlds", "drawn sea floors and true motion, under planners and orders"),
 ];
 
 type Arrows = BTreeMap<String, BTreeSet<String>>;
@@ -68,13 +73,13 @@ fn text(value: &Value) -> String {
     value.as_str().unwrap().to_owned()
 }
 
-/// The normal dependencies of each crate of the workspace, by name.
-fn dependencies() -> Arrows {
+/// The dependencies of each crate of the workspace, by name: those of its tests, or all others.
+fn dependencies(of_tests: bool) -> Arrows {
     let metadata = metadata(&["--no-deps"]);
     let packages = metadata["packages"].as_array().unwrap().iter();
     let names = |p: &Value| {
-        let normal = p["dependencies"].as_array().unwrap().iter().filter(|d| d["kind"] != "dev");
-        normal.map(|d| text(&d["name"])).collect()
+        let some = p["dependencies"].as_array().unwrap().iter().filter(|d| (d["kind"] == "dev") == of_tests);
+        some.map(|d| text(&d["name"])).collect()
     };
     packages.map(|p| (text(&p["name"]), names(p))).collect()
 }
@@ -83,6 +88,15 @@ fn dependencies() -> Arrows {
 fn ours(all: &Arrows) -> Arrows {
     let is_ours = |name: &&String| all.contains_key(*name);
     all.iter().map(|(name, to)| (name.clone(), to.iter().filter(is_ours).cloned().collect())).collect()
+}
+
+/// All crates that a crate needs, directly or not.
+fn needed_by(name: &str, arrows: &Arrows) -> BTreeSet<String> {
+    let (mut all, mut open) = (BTreeSet::new(), vec![name.to_owned()]);
+    while let Some(next) = open.pop() {
+        open.extend(arrows[&next].iter().filter(|to| all.insert((*to).clone())).cloned());
+    }
+    all
 }
 
 /// The lines `crate -> crate crate` of the block `arrows` of ARCHITECTURE.md.
@@ -99,7 +113,7 @@ fn drawn() -> Arrows {
 
 #[test]
 fn crates_depend_on_each_other_as_architecture_draws() {
-    let (drawn, built) = (drawn(), ours(&dependencies()));
+    let (drawn, built) = (drawn(), ours(&dependencies(false)));
     for (name, to) in &built {
         let page = drawn.get(name).unwrap_or_else(|| panic!("ARCHITECTURE.md does not draw {name}"));
         assert_eq!(to, page, "arrows of {name}: left as in its Cargo.toml, right as in ARCHITECTURE.md");
@@ -109,8 +123,22 @@ fn crates_depend_on_each_other_as_architecture_draws() {
 }
 
 #[test]
+fn dependencies_of_tests_follow_the_arrows() {
+    let (arrows, of_tests) = (drawn(), ours(&dependencies(true)));
+    let outside: BTreeSet<(&str, &str)> = of_tests
+        .iter()
+        .flat_map(|(name, to)| to.iter().map(move |to| (name.as_str(), to.as_str())))
+        .filter(|(name, to)| !needed_by(name, &arrows).contains(*to))
+        .collect();
+    let support = TEST_SUPPORT.map(|(name, to, _)| (name, to));
+    assert_eq!(outside, BTreeSet::from(support), "left against the arrows, right allowed as support of tests");
+    let up: Vec<_> = support.into_iter().filter(|(name, to)| needed_by(to, &arrows).contains(*name)).collect();
+    assert!(up.is_empty(), "arrows back up: {up:?}");
+}
+
+#[test]
 fn sans_io_crates_depend_on_no_io_crate() {
-    let all = dependencies();
+    let all = dependencies(false);
     for name in SANS_IO {
         let found: Vec<_> = all[name].iter().filter(|d| IO_CRATES.contains(&d.as_str())).collect();
         assert!(found.is_empty(), "{name} depends on {found:?}");

@@ -1,6 +1,6 @@
 //! Conditions that several keys must satisfy together; those of the modem, and the address of its port.
 
-use crate::key::Key;
+use crate::sections::key::Key;
 use crate::{
     Authenticate, AutopilotKind, CalibrationSource, CameraSource, Config, DepthSource, HostPort, LabelMessage,
     LabelSource, ModemKind, NavigationSource, RosName, S2cMode,

@@ -6,9 +6,9 @@
 
 mod check;
 mod derived;
-mod key;
 mod load;
 mod print;
+mod rule;
 mod secret_files;
 mod sections;
 mod setting;
@@ -18,13 +18,14 @@ pub use derived::{
     authenticity, cell_m, joules_per_bit, map_origin, modem_profile, survey_depth_m, tuning_table, vehicle_address,
     vehicle_names,
 };
-pub use key::{Key, Role, Rule};
 pub use load::load;
 pub use print::{changed_settings, print, reference, schema, shipped_files};
+pub use rule::Rule;
 pub use secret_files::{
     TokenGrant, load_key, load_tokens, open_regular, read_key, read_regular, read_regular_text, read_text, read_token,
     read_tokens, utf16_fault,
 };
+pub use sections::key::{Key, Role};
 pub use sections::{
     Autopilot, Bands, Camera, Channel, Config, Console, Labels, Link, Map, Mission, Modem, Navigation, Operator,
     Position, Record, Ros2, Runtime, Scene, SurfaceSection, Survey, VehicleSection,

@@ -1,7 +1,7 @@
 //! Reading of configuration files and `--set` options.
 
 use crate::check::check_together;
-use crate::key::Section;
+use crate::sections::key::Section;
 use crate::{Config, Key};
 use scenecast_core::UserError;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Configuration files with every key explained, the reference of every key as Markdown, and the JSON Schema of configuration
 //! files.
 
-use crate::key::{Key, Role, Section};
+use crate::sections::key::{Key, Role, Section};
 use crate::{Config, load};
 use scenecast_core::UserError;
 use serde_json::{Map, Value, json};

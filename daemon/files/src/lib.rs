@@ -5,6 +5,7 @@
 mod bag;
 mod bag_recording;
 mod configured;
+mod depth_file;
 mod geojson;
 mod images;
 mod json_file;
@@ -21,6 +22,7 @@ pub use bag_recording::{BagTiming, BagTopics};
 pub use configured::{
     configured_calibration, configured_mounting, configured_recording, configured_vocabulary, open_bag, read_vocabulary,
 };
+pub use depth_file::{DepthFile, read_depth};
 pub use geojson::{AreaShape, CoordinateFrame, FenceShapes, read_areas, read_fence};
 pub use images::{FrameImage, own_scale_m, read_classes, read_image, unread_emptiness};
 pub use label_folder::{FolderItem, LabelFolder, read_class_names};
@@ -29,8 +31,6 @@ pub use record::{
     RecordedFrames, RecordedLink, RecordedMessage, RecoveredPart, SentFrame, StateTime, is_record, mission_records,
     read_record, recover,
 };
-pub use recording::{DepthFile, RecordedFrame, Recorder, Recording, write_poses};
-pub use tum_recording::{
-    NumberFault, TUM_UNITS_PER_M, TumFolder, TumFrame, TumOptions, finite_number, read_depth, tum_camera,
-};
+pub use recording::{RecordedFrame, Recorder, Recording, write_poses};
+pub use tum_recording::{NumberFault, TUM_UNITS_PER_M, TumFolder, TumFrame, TumOptions, finite_number, tum_camera};
 pub use whole::{sync_folder, write_whole};

@@ -1,8 +1,8 @@
 //! Recorded missions: images with their poses.
 
+use crate::depth_file::DepthFile;
 use crate::images::FrameImage;
 use crate::pose_table::{Columns, Placed, PoseRow, PoseTableError, reachable_rows};
-use crate::tum_recording::read_depth;
 use image::RgbImage;
 use scene_model::project::View;
 use scenecast_core::{Area, UserError};
@@ -31,13 +31,6 @@ pub struct RecordedFrame {
     pub depth: Option<DepthFile>,
 }
 
-/// A file of distances, and the units of its whole numbers in a metre.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DepthFile {
-    pub path: PathBuf,
-    pub units_per_m: f64,
-}
-
 impl RecordedFrame {
     /// The image, without distortion if the camera is calibrated, and what it then sees.
     ///
@@ -46,7 +39,7 @@ impl RecordedFrame {
     pub fn read(&self) -> Result<(RgbImage, Option<View>), UserError> {
         let image = self.image.read()?;
         let Some(sight) = &self.sight else { return Ok((image, None)) };
-        let depth = self.depth.as_ref().map(|file| read_depth(&file.path, file.units_per_m)).transpose()?;
+        let depth = self.depth.as_ref().map(DepthFile::read).transpose()?;
         let viewed = sight.view(image, depth);
         let (image, view) = viewed.map_err(|error| UserError::Input(format!("{}: {error}", self.image)))?;
         Ok((image, Some(view)))

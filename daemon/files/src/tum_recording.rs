@@ -4,11 +4,11 @@
 //! `rgb.txt` and `depth.txt` are lines `time file`, `groundtruth.txt` lines `time tx ty tz qx qy qz qw`: camera to
 //! world. Depth is a 16-bit PNG in units of 1/5000 m, 0 where there is no reading.
 
+use crate::depth_file::DepthFile;
 use crate::images::{FrameImage, read_image};
 use crate::pose_table::{Placed, reachable_rows};
-use crate::recording::{DepthFile, RecordedFrame, Recording};
-use image::DynamicImage;
-use scene_model::project::{CameraPose, DepthImage};
+use crate::recording::{RecordedFrame, Recording};
+use scene_model::project::CameraPose;
 use scenecast_core::UserError;
 use scenecast_sensors::{Calibration, Rotation, Sight, Times, tilt_of};
 use std::path::{Component, Path, PathBuf};
@@ -198,21 +198,6 @@ impl TumFolder {
 /// fx, fy, cx and cy of the benchmark's own camera in images of a width, pixels.
 pub fn tum_camera(width_px: u32) -> [f64; 4] {
     BENCHMARK_CAMERA.map(|pixels| pixels * f64::from(width_px) / BENCHMARK_WIDTH_PX)
-}
-
-/// Reads a depth image: a grey PNG of 16 bits with so many units a metre.
-///
-/// # Errors
-/// The file cannot be read, or is another image.
-pub fn read_depth(path: &Path, units_per_m: f64) -> Result<DepthImage, UserError> {
-    match read_image(path)? {
-        DynamicImage::ImageLuma16(depth) => {
-            let (width, height) = depth.dimensions();
-            let metres = depth.into_raw().into_iter().map(|units| (f64::from(units) / units_per_m) as f32).collect();
-            Ok(DepthImage { width, height, metres })
-        }
-        _ => Err(UserError::file(path, "a depth image is a grey PNG of 16 bits")),
-    }
 }
 
 /// A line of a list.

@@ -1,8 +1,8 @@
 //! The header of an item: one JSON object.
 
 use crate::item::{Band, BandScale, Content, Ground, ImagePose, Item, ItemTime, QuantityBand};
-use crate::stream::{MAX_PICTURE_BYTES, Raster, Values};
-use crate::{MAX_HEADER_BYTES, Refusal};
+use crate::raster::{Raster, Values};
+use crate::refusal::{MAX_HEADER_BYTES, MAX_PICTURE_BYTES, Refusal};
 use scenecast_protocol::map::{ClassEntry, Decimal, LayerDescriptor, MAX_CLASS};
 use serde::Deserialize;
 

@@ -6,8 +6,12 @@
 
 mod header;
 mod item;
+mod raster;
+mod refusal;
 pub mod ros;
 mod stream;
 
-pub use item::{Band, BandScale, Content, Ground, ImagePose, Item, ItemTime, QuantityBand, Refusal};
-pub use stream::{MAX_HEADER_BYTES, MAX_PICTURE_BYTES, MAX_PIXELS, Raster, Stream};
+pub use item::{Band, BandScale, Content, Ground, ImagePose, Item, ItemTime, QuantityBand};
+pub use raster::Raster;
+pub use refusal::{LayerFault, MAX_HEADER_BYTES, MAX_PICTURE_BYTES, MAX_PIXELS, MessageFault, Refusal};
+pub use stream::Stream;

@@ -1,5 +1,6 @@
 //! Messages of ROS 2 as items.
 
+use crate::refusal::{LayerFault, MessageFault};
 use crate::{Band, Content, Ground, Item, ItemTime, QuantityBand, Raster, Refusal};
 use scenecast_messages::geometry_msgs::Quaternion;
 use scenecast_messages::grid_map_msgs::GridMap;
@@ -12,30 +13,6 @@ use scenecast_protocol::map::{Decimal, LayerDescriptor, MAX_CLASS};
 const STILL_FRAMES: [&str; 2] = ["map", "odom"];
 /// Turn of a grid that is taken for none, radians: on 2000 cells less than half a cell.
 const MAX_TURN_RAD: f64 = 1e-4;
-
-/// A message of ROS 2 that contradicts itself, or has another encoding.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum MessageFault {
-    #[error("{names} names of layers and {arrays} arrays")]
-    Layers { names: usize, arrays: usize },
-    #[error("a start index lies outside of the grid")]
-    StartIndex,
-    #[error("layer {0:?}: {1}")]
-    Layer(String, LayerFault),
-    #[error("the encoding {0:?}: mono8 and 8UC1 are taken, whose value is the class")]
-    Encoding(String),
-}
-
-/// An array of numbers that is no layer of its grid.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum LayerFault {
-    #[error("{0} dimensions, and two are taken")]
-    Dimensions(usize),
-    #[error("{} x {} numbers on {rows} x {columns} cells", .sizes.0, .sizes.1)]
-    Sizes { sizes: (u32, u32), rows: u32, columns: u32 },
-    #[error("{found} numbers, and {needed} are needed")]
-    Numbers { found: usize, needed: usize },
-}
 
 /// Refuses a message in another frame of reference than `wanted`; without a wanted one, `map`, `odom` and none are taken.
 fn check_frame(header: &Header, wanted: &str) -> Result<(), Refusal> {

@@ -1,7 +1,7 @@
-//! The test basin with its modems, their emulated ports, the schedule of faults, and the messages between the basin and the tasks
-//! at its ports.
+//! The test basin with its modems, their emulated ports, and the schedule of faults.
 
 use super::commands::EmulatorCommand;
+use super::line::{FromHost, PortLine, Speed};
 use super::links::Links;
 use super::scenario::{EmulatedPort, ModemFault, Scenario, ScenarioModem, node};
 use super::{Pace, tcp};
@@ -12,9 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::net::SocketAddr;
 use std::time::{Duration, SystemTime};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::TcpListener;
 use tokio::sync::mpsc;
-use tokio::task::AbortHandle;
 
 /// Noise is sent in pieces at this interval, so that it lasts as long on a line without pacing.
 const NOISE_INTERVAL: Duration = Duration::from_millis(100);
@@ -304,73 +303,4 @@ fn speed(modem: &ScenarioModem, pace: Pace) -> Speed {
 /// The reader of the standard output may be gone; the emulation continues.
 fn print_line(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
-}
-
-/// Pieces that wait for the task at a port; further ones are lost, as on a line without a reader.
-const WAITING_PIECES: usize = 1024;
-
-/// A message of a client or of a port. `modem` counts from 0 in the order of the scenario; `line` is the number that
-/// the port gave to the client, 0 for a serial line.
-#[derive(Debug)]
-pub enum FromHost {
-    Bytes {
-        modem: usize,
-        line: u32,
-        bytes: Vec<u8>,
-    },
-    /// A TCP client connected to the port.
-    Joined {
-        modem: usize,
-        stream: TcpStream,
-    },
-    /// A TCP client closed its connection.
-    Left {
-        modem: usize,
-        line: u32,
-    },
-}
-
-/// The output to one client; its task is aborted when this is dropped.
-#[derive(Debug)]
-pub struct PortLine {
-    to_client: mpsc::Sender<Vec<u8>>,
-    task: AbortHandle,
-}
-
-impl PortLine {
-    /// Starts a task that receives the bytes for the client.
-    pub fn start<F: Future<Output = ()> + Send + 'static>(task: impl FnOnce(mpsc::Receiver<Vec<u8>>) -> F) -> Self {
-        let (to_client, output) = mpsc::channel(WAITING_PIECES);
-        Self { to_client, task: tokio::spawn(task(output)).abort_handle() }
-    }
-
-    /// Sends bytes to the client; they are lost if [`WAITING_PIECES`] pieces wait already.
-    pub fn send(&self, bytes: Vec<u8>) {
-        let _ = self.to_client.try_send(bytes);
-    }
-}
-
-impl Drop for PortLine {
-    fn drop(&mut self) {
-        self.task.abort();
-    }
-}
-
-/// The pace of a line in wall time.
-#[derive(Debug, Clone, Copy)]
-pub struct Speed {
-    /// Bytes a second of wall time; `None` without pacing.
-    pub bytes_per_s: Option<f64>,
-}
-
-impl Speed {
-    /// Maximum number of bytes to read at a time: those of five milliseconds.
-    pub fn piece(&self) -> usize {
-        self.bytes_per_s.map_or(4096, |rate| ((rate * 0.005) as usize).clamp(16, 4096))
-    }
-
-    /// Wall time for which that many bytes occupy the line.
-    pub fn time_of(&self, bytes: usize) -> Duration {
-        self.bytes_per_s.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(bytes as f64 / rate))
-    }
 }

@@ -6,6 +6,7 @@
 
 mod commands;
 mod emulation;
+mod line;
 mod links;
 #[cfg(unix)]
 mod pty;
@@ -15,7 +16,8 @@ mod tcp;
 pub use scenario::Scenario;
 
 use commands::EmulatorCommand;
-use emulation::{Emulation, FromHost};
+use emulation::Emulation;
+use line::FromHost;
 use links::Links;
 use scenecast_core::UserError;
 use scenecast_runtime::Stop;

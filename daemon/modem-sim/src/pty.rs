@@ -1,6 +1,6 @@
 //! A pseudo-terminal as the port of a modem; clients may open and close it at any time.
 
-use super::emulation::{FromHost, Speed};
+use super::line::{FromHost, Speed};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::openpty;
 use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcflush, tcgetattr, tcsetattr};

@@ -1,6 +1,6 @@
 //! A TCP port of a modem: several clients at once.
 
-use super::emulation::{FromHost, Speed};
+use super::line::{FromHost, Speed};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::tcp::OwnedReadHalf;
 use tokio::net::{TcpListener, TcpStream};

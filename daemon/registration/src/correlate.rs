@@ -2,8 +2,8 @@
 //!
 //! The planes are high-passed, so their means over an overlap are taken as 0 (Padfield 2012 without the means).
 
+use crate::fourier::{Complex32, PlaneFft};
 use crate::plane::Plane;
-use scenecast_fourier::{Complex32, PlaneFft};
 
 /// The second peak is at least so far from the first one, pixels.
 const PEAK_RADIUS_PX: f32 = 4.0;

@@ -1,7 +1,8 @@
 //! All frames of a mission placed together, once the mission has ended, by least squares over many unknowns.
 
+use crate::evidence::{Evidence, Step};
 use crate::pair::{Link, Match};
-use crate::pose::{Evidence, FramePose, Step};
+use crate::pose::FramePose;
 use crate::registrar::{CHAIN_ALIKE, LOOPS_ALIKE, Placed};
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use scenecast_core::wrap_rad;
@@ -63,7 +64,7 @@ impl FrameGraph {
     pub(crate) fn with_wrong_loop(&self, metres: f64) -> Self {
         let mut wrong = self.clone();
         let last = wrong.frames.iter_mut().rev().find_map(|frame| frame.evidence.loops.last_mut()).unwrap();
-        let by = crate::consensus::Similarity::new(0.0, 1.0, Vector2::new(metres, metres));
+        let by = crate::similarity::Similarity::new(0.0, 1.0, Vector2::new(metres, metres));
         last.found.similarity = by.after(&last.found.similarity);
         wrong
     }

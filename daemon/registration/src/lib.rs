@@ -9,6 +9,8 @@ mod camera_image;
 mod compass;
 mod consensus;
 mod correlate;
+mod evidence;
+mod fourier;
 mod geometry;
 mod graph;
 #[cfg(test)]
@@ -22,12 +24,16 @@ mod refine;
 mod registrar;
 #[cfg(test)]
 mod registrar_tests;
+mod saved_state;
+mod similarity;
 #[cfg(test)]
 mod skerki_tests;
 mod tiles;
 
 pub use camera_image::CameraImage;
+pub use evidence::{Evidence, Tally};
 pub use geometry::{CameraFinding, CameraGeometry, GeometryCheck};
 pub use graph::FrameGraph;
-pub use pose::{Evidence, FramePose, RestoreError, Tally};
+pub use pose::FramePose;
 pub use registrar::{FrameInput, Placed, Registrar};
+pub use saved_state::RestoreError;

@@ -1,8 +1,8 @@
 //! The similarity between two thumbnails to a fraction of a pixel, by Gauss-Newton on the brightness (Lucas and Kanade
 //! 1981; in the inverse compositional form of Baker and Matthews 2004).
 
-use crate::consensus::Similarity;
 use crate::plane::Plane;
+use crate::similarity::Similarity;
 use nalgebra::{Matrix4, Vector2, Vector4};
 use std::ops::Range;
 

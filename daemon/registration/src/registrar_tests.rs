@@ -1,8 +1,8 @@
 //! Flights over a floor of noise.
 
 use crate::camera_image::CameraImage;
-use crate::pose::RestoreError;
 use crate::registrar::{FrameInput, Placed, Registrar};
+use crate::saved_state::RestoreError;
 use proptest::prelude::*;
 use scenecast_protocol::coordinates::MapPoint;
 

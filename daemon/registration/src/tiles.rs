@@ -3,9 +3,9 @@
 //! A point at height z above the mean floor is nearer to a camera at the altitude H. Where the camera moved by b, the
 //! point moves by b (1 + z / H) in the frame: parallax lies along b, and its errors do not reach across b.
 
-use crate::consensus::Similarity;
 use crate::plane::Plane;
 use crate::refine::Reference;
+use crate::similarity::Similarity;
 use nalgebra::{Matrix2, Vector2};
 
 /// Columns and rows of tiles in a frame.

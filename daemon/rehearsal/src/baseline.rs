@@ -1,15 +1,31 @@
 //! The baseline: the whole PNG is sent again after each change of the map, in fragments, of which lost ones are sent again.
 
-use crate::fidelity::{Meter, Stream};
-use crate::frames_log::Repeats;
+use crate::frames_log::{FramesLog, Repeats};
 use crate::link_rig::LinkRig;
+use crate::meter::Meter;
 use crate::mission::{MapQuality, Mission};
 use crate::virtual_time::VirtualTime;
 use scenecast_config::Config;
 use scenecast_core::{UserError, label_picture};
+use scenecast_protocol::link::LinkStats;
 use scenecast_protocol::map::{Cell, LabelGrid, Rect, StateReplica, StateSource};
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// What a row is made of, after the survey.
+pub(crate) struct Stream<'a> {
+    pub(crate) name: &'static str,
+    pub(crate) labels: &'a Meter,
+    /// Both maps every half minute, then at the end.
+    pub(crate) series: &'a [MapQuality],
+    pub(crate) end: MapQuality,
+    /// The counters of the vehicle's end, and the bits that it put on air, repeats of the modem left out and included.
+    pub(crate) stats: &'a LinkStats,
+    pub(crate) sent_bits: u64,
+    pub(crate) bits_on_air: u64,
+    pub(crate) frames: &'a FramesLog,
+    pub(crate) repeats: Repeats,
+}
 
 /// Bare links beside a mission that carry its map as whole PNGs.
 ///

@@ -6,11 +6,13 @@ mod carrier;
 mod conformance_tests;
 #[cfg(test)]
 mod discovery_tests;
+mod energy;
 mod fidelity;
 mod frames_log;
 mod instruments;
 pub mod link_bench;
 mod link_rig;
+mod meter;
 mod mission;
 pub mod modem_bench;
 pub mod modem_rig;
@@ -25,10 +27,11 @@ mod virtual_time;
 mod world;
 
 pub use baseline::{WholeReplica, WholeSource};
-pub use fidelity::{Delays, FidelityRow, fidelity, fidelity_panels};
+pub use fidelity::{FidelityRow, fidelity, fidelity_panels};
 pub use frames_log::{FramesLog, Repeats, Uplink};
 pub use instruments::{Instruments, Receiver, SimulatedAutopilot, simulated_autopilot};
 pub use link_rig::LinkRig;
+pub use meter::Delays;
 pub use mission::{EndEvent, FrameErrors, MapInformation, MapQuality, Mission, MissionOptions};
 pub use outputs::write_outputs;
 pub use quality::{Curve, Line, Panel, quality_plot};

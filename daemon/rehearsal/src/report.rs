@@ -9,7 +9,7 @@ use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::map::{Cell, LabelGrid, LayerSource};
 use scenecast_protocol::schedule::Class;
-use scenecast_scoring::MutualInformation;
+use scenecast_worlds::scoring::MutualInformation;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -22,10 +22,12 @@ mod inbox;
 mod names;
 mod node;
 mod stop;
+mod subscriptions;
 #[cfg(feature = "surface")]
 mod surface;
 mod transport;
 mod vehicle;
+mod vehicle_map;
 #[cfg(feature = "zenoh")]
 mod zenoh;
 #[cfg(not(feature = "zenoh"))]
@@ -39,4 +41,5 @@ pub use scenecast_messages::contents::valid_part;
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};
 pub use transport::{Peers, Qos, Transport};
-pub use vehicle::{VehicleMap, VehicleOutlet, VehicleView, start_vehicle};
+pub use vehicle::{VehicleOutlet, VehicleView, start_vehicle};
+pub use vehicle_map::VehicleMap;

@@ -1,9 +1,9 @@
 //! The vehicle in ROS 2: its own map, pose, path and state.
 
-use crate::names::MapVersions;
 use crate::node::{Publisher, RosNode};
 use crate::stop::{self, Owned, Owner};
 use crate::transport::Qos;
+use crate::vehicle_map::{MapVersions, VehicleMap};
 use scenecast_config::Ros2;
 use scenecast_core::{UserError, palette};
 use scenecast_messages::builtin_interfaces::Time;
@@ -15,7 +15,6 @@ use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::grid_map_msgs::GridMap;
 use scenecast_messages::nav_msgs::{OccupancyGrid, Path};
 use scenecast_messages::sensor_msgs::PointCloud2;
-use scenecast_protocol::map::{LabelGrid, LayerDescriptor};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -223,13 +222,4 @@ impl VehicleTopics {
         }
         self.track.push_back(place.clone());
     }
-}
-
-/// The map of a vehicle: labels, and levels of its layers.
-#[derive(Debug, Clone)]
-pub struct VehicleMap {
-    pub version: u64,
-    pub cell_m: f64,
-    pub labels: LabelGrid,
-    pub layers: Vec<(LayerDescriptor, LabelGrid)>,
 }

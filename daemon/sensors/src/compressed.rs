@@ -1,5 +1,6 @@
 //! Compressed images: JPEG, PNG, PPM and TIFF.
 
+use crate::MAX_PIXELS;
 use crate::exif::{exif_orientation, exif_stamp};
 use crate::jpeg_end::{is_cut_jpeg, missing_rows};
 use crate::tiff_pages::{Prepared, Samples, has_all_its_data, prepared, samples};
@@ -12,9 +13,6 @@ use image::{
 };
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-
-/// Pixels of the largest image that is decoded.
-pub const MAX_PIXELS: u32 = 64 << 20;
 
 /// An image that cannot be used, as one line for people.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -1,4 +1,7 @@
-//! The size of a camera's images, where no calibration says it.
+//! The size of a camera's images: the largest, and the one that all have where no calibration says it.
+
+/// Pixels of the largest image that is decoded.
+pub const MAX_PIXELS: u32 = 64 << 20;
 
 /// The first image's size, which those after it have too: a pixel of another size would lie elsewhere on the sea floor.
 #[derive(Debug, Default)]

@@ -1,6 +1,6 @@
 //! Clouds of points in the axes of a camera, seen as depth images.
 
-use crate::depth::{DepthError, check_rows};
+use crate::depth_rows::{DepthError, check_rows};
 use scene_model::project::{DepthImage, PinholeCamera};
 use scenecast_messages::sensor_msgs::{PointCloud2, PointField};
 

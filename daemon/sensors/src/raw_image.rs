@@ -1,6 +1,6 @@
 //! Raw pixels in the encodings of ROS 2 (`sensor_msgs/image_encodings.hpp`): Bayer mosaics, and levels of 10, 12 or 14 bits.
 
-use crate::compressed::MAX_PIXELS;
+use crate::MAX_PIXELS;
 use image::{Rgb, RgbImage};
 
 /// A raw image as it came in.

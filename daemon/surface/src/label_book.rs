@@ -1,11 +1,24 @@
 //! What the operator says of labels: one truth for the page, exports, reports and other programs.
 
-use super::record::StoredLabel;
 use scenecast_core::palette;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
+
+/// The operator's name, colour and merging of a label.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+pub struct StoredLabel {
+    /// The operator's name of the label; null without one.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// The operator's colour of the label, as in `#a0b1c2`; null without one.
+    #[serde(default)]
+    pub colour: Option<String>,
+    /// The label that it is shown as a part of; null without one.
+    #[serde(default)]
+    pub merged_into: Option<u8>,
+}
 
 /// The operator's names, colours and merges, by label.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]

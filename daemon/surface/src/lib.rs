@@ -17,6 +17,7 @@ mod link_meter;
 mod log;
 mod logging;
 mod map_cells;
+mod map_changes;
 mod map_in_view;
 pub mod messages;
 mod orders;
@@ -24,6 +25,7 @@ pub mod position;
 pub mod record;
 pub mod recorder;
 mod refusal;
+mod reported_orders;
 mod request;
 mod send_orders;
 mod settings_record;
@@ -46,7 +48,7 @@ pub use layers::cell_layers;
 pub use link_meter::LinkMeter;
 pub use log::{AUTOPILOT_SILENT, LogEntry, LogKind, MissionLog, NO_FAULT};
 pub use map_cells::{CellLayer, MapCaption, MapCells, tile_place};
-pub use map_in_view::LabelGains;
+pub use map_changes::LabelGains;
 pub use orders::{
     AgainOrder, AreaOrder, AreasOrder, BudgetOrder, CONSTRAINT_NAMES, CommandOrder, CommandOrderAction,
     ConstraintsAction, ConstraintsOrder, DestinationOrder, DismissOrder, DraftOrder, ExemplarAction, ExemplarOrder,

@@ -5,10 +5,27 @@ mod watch;
 pub(super) use watch::Watch;
 pub use watch::{AUTOPILOT_SILENT, NO_FAULT};
 
-use super::record::{MAX_LOG, StoredLogEntry};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
+
+/// Entries that are kept of the mission's log.
+pub(crate) const MAX_LOG: usize = 2000;
+
+/// An entry of the mission's log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredLogEntry {
+    /// One more than that of the entry before.
+    pub number: u64,
+    pub at: u64,
+    /// The address of the vehicle that it concerns, if one.
+    pub vehicle: Option<u8>,
+    /// 0 order, 1 answer, 2 contact, 3 mode, 4 label, 5 image, 6 record, 7 command.
+    pub kind: u8,
+    pub by: Option<String>,
+    pub text: String,
+}
 
 /// The kind of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,10 +1,10 @@
 //! The surface's role: the link and the operator's data in one state machine without IO.
 
 use super::command::{Command, CommandAction, CommandChange, CommandRefusal, OrderKind};
-use super::in_force;
 use super::log::{LogKind, MissionLog, Watch};
 use super::position::{Relay, UsblSighting};
 use super::refusal::OrderRefusal;
+use super::reported_orders;
 use super::vehicle_record::VehicleRecord;
 use scenecast_config::RestoreOrders;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
@@ -390,7 +390,7 @@ impl Surface {
     }
 
     fn follow_in_force(&mut self, vehicle: Address) -> Option<SurfaceOutput> {
-        in_force::follow(self.records.get_mut(&vehicle)?, &self.link.vehicle(vehicle)?);
+        reported_orders::follow(self.records.get_mut(&vehicle)?, &self.link.vehicle(vehicle)?);
         Some(SurfaceOutput::Changed(vehicle))
     }
 

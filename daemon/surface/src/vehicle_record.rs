@@ -4,7 +4,7 @@ use super::annotations::AnnotationRefusal;
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
 use super::label_book::LabelBook;
-use super::map_in_view::{Corrections, LabelGains};
+use super::map_changes::{Corrections, LabelGains};
 use super::record::{EarlierMap, StoredLabel};
 use super::settings_record::SettingsRecord;
 use super::track::{Pauses, RegistrationRecord, Track};

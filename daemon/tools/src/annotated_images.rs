@@ -3,7 +3,7 @@
 use image::{GrayImage, RgbImage};
 use scenecast_core::UserError;
 use scenecast_files::{read_classes, read_image};
-use scenecast_scoring::{Annotations, TrialError};
+use scenecast_worlds::scoring::{Annotations, TrialError};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

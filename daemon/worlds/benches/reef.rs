@@ -1,16 +1,11 @@
 //! The CPU time of frames over the reef, and the process's memory: `cargo bench -p scenecast-worlds --bench reef`.
-#![allow(clippy::disallowed_methods, missing_docs)]
+#![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
 
+#[path = "../../../scene-model/benches/cpu/mod.rs"]
+mod cpu;
+
+use cpu::cpu_seconds;
 use scenecast_worlds::{Reef, ReefCamera, View};
-use std::time::Instant;
-
-/// CPU time of this thread in seconds (on Linux; elsewhere the wall time since the first call).
-fn cpu_seconds() -> f64 {
-    thread_local!(static START: Instant = Instant::now());
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let spent = text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).map(|ns| ns * 1e-9);
-    spent.unwrap_or_else(|| START.with(|start| start.elapsed().as_secs_f64()))
-}
 
 fn main() {
     for seed in 1..=3 {

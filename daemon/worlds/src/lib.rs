@@ -1,9 +1,10 @@
-//! Procedural worlds with known truth.
+//! Procedural worlds with known truth, and scores of maps against it.
 //!
 //! [`patches`] draws a sea floor from the generative process of the scene model, as an image with the class of each
 //! pixel. [`Reef`] is a sea floor that looks like one, with a camera over it. [`sample`] draws a label map from the prior
-//! itself. [`Motion`] and [`Odometry`] are the true motion of a vehicle and what its sensors make of it. All are functions of
-//! their arguments: the same seed gives the same world. No input or output; no crate that goes to sea uses this one.
+//! itself. [`Motion`] and [`Odometry`] are the true motion of a vehicle and what its sensors make of it. [`scoring`] compares maps
+//! with the truth or with annotations, and trains vocabularies. All are functions of their arguments: the same seed gives the same
+//! world. No input or output; no crate that goes to sea uses this one.
 //!
 //! ```
 //! // 640 x 480 pixels, patches of about 60 pixels, at most 6 classes.
@@ -18,6 +19,7 @@ mod noise;
 mod patches;
 mod reef;
 mod sample;
+pub mod scoring;
 mod track_audit;
 
 pub use motion::{Motion, Odometry};

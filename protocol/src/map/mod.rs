@@ -4,6 +4,7 @@
 //! these two sides ([`StateSource`], [`StateReplica`]).
 
 mod class;
+mod coarse;
 #[allow(clippy::indexing_slicing)] // A place in a tile is less than its size.
 mod dirty;
 mod layer;

@@ -1,7 +1,8 @@
 //! The vehicle's side of the map: the map itself, the surface's known copy, and the cells in flight.
 
+use super::coarse::Coarse;
 use super::dirty::{CellChange, Dirty};
-use super::value::{Coarse, Debounce, Hold, Interest};
+use super::value::{Debounce, Hold, Interest};
 use super::{Cell, LabelGrid, MAX_CONFIDENCE, MapDigest, StateSource, UNEXPLORED};
 use crate::map_codec::{self, Codec, Stride};
 use crate::time::Instant;

@@ -1,44 +1,15 @@
 //! The choice of the coder, encoding of the best chunk for a given room, and decoding of any chunk.
 
 use super::context::Decision;
-use super::grow::{Growth, Lattice, Stride};
+use super::grow::Growth;
 use super::header::{Body, ChunkHeader, base_check};
-use super::series::Patch;
+use super::lattice::{Lattice, Stride};
+use super::patch::{DecodeError, MapChunk};
 use super::{context, png};
 use crate::bytes::BitReader;
 use crate::grid::{Cell, LabelGrid, Rect};
 use std::fmt;
 use std::str::FromStr;
-
-/// An encoded change of the map.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MapChunk {
-    /// The bytes that [`decode`] needs besides the base.
-    pub bytes: Vec<u8>,
-    /// The changed cells with their new labels (0 makes a cell unexplored), exactly as [`decode`] returns them.
-    pub changes: Vec<(Cell, u8)>,
-}
-
-/// Why a chunk is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DecodeError {
-    /// The bytes end inside the header.
-    #[error("map chunk ends early")]
-    Truncated,
-    /// The patch is larger than allowed or leaves the 32-bit grid.
-    #[error("map chunk has an impossible patch")]
-    BadGeometry,
-    /// The chunk was coded against another base, or has a byte too many or too few.
-    #[error("map chunk was coded against another base")]
-    BaseMismatch,
-    /// The encoder never writes such a body.
-    #[error("map chunk is corrupt")]
-    Corrupt,
-    /// The body needs an unknown coder.
-    #[error("map chunk uses an unknown codec")]
-    UnknownCodec,
-}
 
 /// The best chunk of at most `room` bytes around `seed`.
 ///
@@ -173,16 +144,6 @@ fn open<'a>(base: &'a LabelGrid, bytes: &'a [u8]) -> Result<(ChunkHeader, BitRea
         return Err(DecodeError::BaseMismatch);
     }
     Ok((header, bits, base))
-}
-
-/// The header of a chunk for `rect`.
-pub(super) fn header_for(base: Lattice<'_>, body: Body, rect: Rect) -> ChunkHeader {
-    ChunkHeader { body, stride: base.stride(), patch: rect, check: base_check(base, rect) }
-}
-
-/// The chunk with the content `patch` and these bytes.
-pub(super) fn chunk(patch: &Patch, bytes: Vec<u8>) -> MapChunk {
-    MapChunk { bytes, changes: patch.changes() }
 }
 
 /// How chunks are encoded; every decoder reads all of them.

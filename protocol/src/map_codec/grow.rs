@@ -1,8 +1,9 @@
-//! Compact patches: growth around a cell in nested rectangles, and sublattices of a map.
+//! Compact patches: growth around a cell in nested rectangles.
 
-use super::series::{Area, GrowthWindow};
+use super::lattice::Lattice;
+use super::patch::Patch;
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
-use crate::grid::{Cell, LabelGrid};
+use crate::grid::{Cell, MAX_LABEL, Rect};
 
 /// Nested areas around the centre of `window`, smallest first; each holds more changes than the one before.
 #[derive(Debug)]
@@ -103,67 +104,99 @@ fn least_bits(window: &GrowthWindow, column: usize, row: usize) -> usize {
     }
 }
 
-/// Every n-th cell of a map, n = 1 or 4, numbered without gaps: cell (x, y) of the lattice is cell (n x,
-/// n y) of the map.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Lattice<'a> {
-    grid: &'a LabelGrid,
-    stride: Stride,
+/// The base and the wanted changes in a square of cells.
+#[derive(Debug)]
+pub(super) struct GrowthWindow {
+    /// South-west corner; it may lie off the 32-bit grid, where no cell is wanted.
+    pub(super) x: i64,
+    pub(super) y: i64,
+    pub(super) side: usize,
+    base: Vec<u8>,
+    target: Vec<u8>,
+    /// Cells to be sent, row by row.
+    wanted: Vec<bool>,
 }
 
-/// The distance between the cells of a lattice.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Stride {
-    /// A lattice of all cells.
-    #[default]
-    One,
-    /// A lattice of every fourth cell in both directions.
-    Four,
-}
+impl GrowthWindow {
+    /// The `2 * reach` square around `seed`.
+    pub(super) fn around(
+        base: Lattice<'_>,
+        target: Lattice<'_>,
+        seed: Cell,
+        reach: usize,
+        wanted: &dyn Fn(Cell) -> bool,
+    ) -> Self {
+        let side = 2 * reach;
+        let (x, y) = (i64::from(seed.x) - reach as i64, i64::from(seed.y) - reach as i64);
+        let base = base.copy_area(x, y, side, side);
+        let target = target.copy_area(x, y, side, side);
+        let wanted = (0..side * side)
+            .map(|i| {
+                let (old, new) = (base[i], target[i]);
+                old != new && new <= MAX_LABEL && {
+                    // A cell that holds a label lies on the grid.
+                    wanted(Cell::new((x + (i % side) as i64) as i32, (y + (i / side) as i64) as i32))
+                }
+            })
+            .collect();
+        Self { x, y, side, base, target, wanted }
+    }
 
-impl Stride {
-    /// The distance in cells of the map.
-    pub const fn cells(self) -> i32 {
-        match self {
-            Self::One => 1,
-            Self::Four => 4,
+    /// Whether the cell in `column` of `row` is to be sent.
+    pub(super) fn is_wanted(&self, column: usize, row: usize) -> bool {
+        self.wanted[row * self.side + column]
+    }
+
+    /// The new label of the cell, or its label in the base if the cell is not wanted.
+    pub(super) fn outcome(&self, column: usize, row: usize) -> u8 {
+        let i = row * self.side + column;
+        if self.wanted[i] { self.target[i] } else { self.base[i] }
+    }
+
+    /// The part of the window in `area` as base and outcome.
+    pub(super) fn patch(&self, area: Area) -> Patch {
+        let rect = Rect {
+            x: (self.x + area.left as i64) as i32,
+            y: (self.y + area.bottom as i64) as i32,
+            width: area.width() as u32,
+            height: area.height() as u32,
+        };
+        let mut patch = Patch { rect, base: Vec::new(), outcome: Vec::new() };
+        for row in area.bottom..area.top {
+            for column in area.left..area.right {
+                patch.base.push(self.base[row * self.side + column]);
+                patch.outcome.push(self.outcome(column, row));
+            }
         }
-    }
-
-    /// The cell of the map at a cell of the lattice.
-    pub(super) fn on_map(self, cell: Cell) -> Cell {
-        Cell::new(cell.x.wrapping_mul(self.cells()), cell.y.wrapping_mul(self.cells()))
-    }
-
-    /// The cell of the lattice at a cell of the map, if it is on the lattice.
-    pub fn on_lattice(self, cell: Cell) -> Option<Cell> {
-        let n = self.cells();
-        (cell.x % n == 0 && cell.y % n == 0).then(|| Cell::new(cell.x / n, cell.y / n))
+        patch
     }
 }
 
-impl<'a> Lattice<'a> {
-    pub(super) fn new(grid: &'a LabelGrid, stride: Stride) -> Self {
-        Self { grid, stride }
+/// A rectangle inside a window: columns `left..right`, rows `bottom..top`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Area {
+    pub(super) left: usize,
+    pub(super) right: usize,
+    pub(super) bottom: usize,
+    pub(super) top: usize,
+}
+
+impl Area {
+    pub(super) fn width(&self) -> usize {
+        self.right - self.left
     }
 
-    pub(super) fn whole(grid: &'a LabelGrid) -> Self {
-        Self::new(grid, Stride::One)
+    pub(super) fn height(&self) -> usize {
+        self.top - self.bottom
     }
 
-    pub(super) fn stride(&self) -> Stride {
-        self.stride
+    /// Grows to include the cell.
+    pub(super) fn include(&mut self, column: usize, row: usize) {
+        (self.left, self.right) = (self.left.min(column), self.right.max(column + 1));
+        (self.bottom, self.top) = (self.bottom.min(row), self.top.max(row + 1));
     }
 
-    /// As [`LabelGrid::copy_area`], in cells of the lattice.
-    pub(super) fn copy_area(&self, x: i64, y: i64, width: usize, height: usize) -> Vec<u8> {
-        let step = self.stride.cells() as usize;
-        if step == 1 {
-            return self.grid.copy_area(x, y, width, height);
-        }
-        let n = step as i64;
-        let across = (width.max(1) - 1) * step + 1;
-        let row = |row: i64| self.grid.copy_area(x * n, row * n, across, 1);
-        (y..y + height as i64).flat_map(|at| row(at).into_iter().step_by(step)).collect()
+    pub(super) fn cells(&self) -> usize {
+        self.width() * self.height()
     }
 }

@@ -3,7 +3,7 @@
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::Rect;
-use crate::map_codec::grow::{Lattice, Stride};
+use crate::map_codec::lattice::{Lattice, Stride};
 use crc::{CRC_8_AUTOSAR, Crc};
 
 /// The coder of the body.
@@ -43,6 +43,11 @@ pub(super) const CHECK_MARGIN: usize = 16;
 impl ChunkHeader {
     #[cfg(test)]
     const MAX_BYTES: usize = 13;
+
+    /// The header of a chunk for `patch`.
+    pub(super) fn new(base: Lattice<'_>, body: Body, patch: Rect) -> Self {
+        Self { body, stride: base.stride(), patch, check: base_check(base, patch) }
+    }
 
     pub(super) fn write(&self, out: &mut BitWriter) {
         let ((place, n), (side, m)) = (self.place_size(), self.side_size());

@@ -7,21 +7,26 @@ mod chunk;
 #[allow(clippy::indexing_slicing)] // Tables whose sizes the layouts of its contexts give.
 mod context;
 mod file;
+#[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
 mod grow;
 mod header;
+mod lattice;
+#[allow(clippy::indexing_slicing)] // Cells of its own patch.
+mod patch;
 mod png;
 #[allow(clippy::indexing_slicing)]
 mod raster;
-#[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
+#[allow(clippy::indexing_slicing)] // Cells of a row that it has counted.
 mod series;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use chunk::encode_quickly;
-pub use chunk::{ChunkPatch, Codec, DecodeError, MapChunk, decode, encode, encode_every, patch, trace};
+pub use chunk::{ChunkPatch, Codec, decode, encode, encode_every, patch, trace};
 pub use context::{Decision, training};
 pub use file::{ChunkFile, ChunkFileError};
-pub use grow::Stride;
+pub use lattice::Stride;
+pub use patch::{DecodeError, MapChunk};
 pub use png::restored_png;
 pub use raster::{Deflate, LabelRaster, RasterPngError};
 pub use series::encode_all;

@@ -3,14 +3,12 @@
 //! Pixel 0 is an untouched cell; any other pixel stands for a new label. On the wire are a flag whether pixels are
 //! labels or indices of a list, two bits of depth, that list, and the raw deflate stream of the scanlines.
 
-use super::DecodeError;
+use super::grow::Growth;
 use super::header::ChunkHeader;
-use super::series::Patch;
+use super::lattice::Lattice;
+use super::patch::{DecodeError, MapChunk, Patch};
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::{MAX_LABEL, Rect, UNEXPLORED};
-use crate::map_codec::MapChunk;
-use crate::map_codec::chunk::chunk;
-use crate::map_codec::grow::{Growth, Lattice};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use miniz_oxide::deflate::core::{
     CompressorOxide, TDEFLFlush, TDEFLStatus, compress, create_comp_flags_from_zip_params,
@@ -91,7 +89,7 @@ pub fn restored_png(bytes: &[u8]) -> Result<Vec<u8>, DecodeError> {
 
 /// The header of a `png` chunk for `rect`.
 fn head(base: Lattice<'_>, rect: Rect) -> ChunkHeader {
-    super::chunk::header_for(base, super::header::Body::Png, rect)
+    ChunkHeader::new(base, super::header::Body::Png, rect)
 }
 
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
@@ -196,14 +194,14 @@ pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room:
         best = fitter.fill(best, &patch_of(too_large)?)?;
     }
     let bytes = write(&mut fitter.deflater, &head(base, best.rect), &best, DeflateEffort::Full);
-    (bytes.len() <= room).then(|| chunk(&best, bytes))
+    (bytes.len() <= room).then(|| MapChunk::of(&best, bytes))
 }
 
 /// The `png` chunk with the content of `chunk`, if it is shorter.
 pub(in crate::map_codec) fn smaller(base: Lattice<'_>, other: &MapChunk) -> Option<MapChunk> {
     let patch = Patch::of(base, &other.changes)?;
     let bytes = write(&mut Deflater::new(), &head(base, patch.rect), &patch, DeflateEffort::Quick);
-    (bytes.len() < other.bytes.len()).then(|| chunk(&patch, bytes))
+    (bytes.len() < other.bytes.len()).then(|| MapChunk::of(&patch, bytes))
 }
 
 struct Fitter<'a> {

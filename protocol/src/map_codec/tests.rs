@@ -1,8 +1,7 @@
 //! Coding and decoding of whole changes.
 
-use super::chunk::header_for;
-use super::grow::Lattice;
-use super::header::Body;
+use super::header::{Body, ChunkHeader};
+use super::lattice::Lattice;
 use super::{Codec, DecodeError, MapChunk, decode, encode, restored_png};
 use crate::bytes::BitWriter;
 use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};
@@ -121,7 +120,7 @@ proptest! {
         width in 1..60u32, height in 1..60u32, body in prop::collection::vec(any::<u8>(), 0..120),
     ) {
         let patch = Rect { x, y, width, height };
-        let head = header_for(Lattice::whole(&base), if context { Body::Context } else { Body::Png }, patch);
+        let head = ChunkHeader::new(Lattice::whole(&base), if context { Body::Context } else { Body::Png }, patch);
         let mut bits = BitWriter::default();
         head.write(&mut bits);
         body.iter().for_each(|&byte| bits.put(u64::from(byte), 8));

@@ -1,7 +1,7 @@
 //! The cryptography of authentic frames: keys and tags.
 //!
 //! All of it uses one primitive, Ascon-AEAD128 (NIST SP 800-232): for frames as the standard defines it, for sub-keys
-//! and tags as the function `prf` in `key.rs` explains.
+//! and tags as the function `prf` in `ascon.rs` explains.
 //!
 //! ```text
 //! mission key (16 secret bytes, the surface's key file)
@@ -15,6 +15,7 @@
 //!                     +-- tags and encryption of frames, by direction and frame number
 //! ```
 
+mod ascon;
 mod key;
 mod offer;
 mod session;

@@ -1,6 +1,7 @@
 //! The offer of the next key of a vehicle, under its present one.
 
-use super::key::{LinkKey, VehicleKey, prf};
+use super::ascon::prf;
+use super::key::{LinkKey, VehicleKey};
 use crate::bytes::{Reader, Truncated};
 
 /// The nonce of the key stream, under the present key of the vehicle. It is used once with each part of each next key.

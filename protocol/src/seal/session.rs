@@ -1,7 +1,7 @@
 //! The key of a session, which seals and opens frames.
 
 use super::Tag;
-use super::key::{Secret, ShortTagged, encrypt, join, mac};
+use super::ascon::{Secret, ShortTagged, encrypt, join, mac};
 use ascon_aead::aead::{AeadInOut, KeyInit};
 use std::fmt;
 

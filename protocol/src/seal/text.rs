@@ -1,6 +1,7 @@
 //! The text of a key file.
 
-use super::key::{HeldKey, LinkKey, MissionKey, VehicleKey, join, prf};
+use super::ascon::{join, prf};
+use super::key::{HeldKey, LinkKey, MissionKey, VehicleKey};
 use zeroize::Zeroizing;
 
 const VERSION: &str = "2";

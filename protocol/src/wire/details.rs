@@ -1,6 +1,6 @@
 //! What a vehicle reports beside the pose of the same frame: backlog, disk, faults of its equipment.
 
-use super::status::StatusError;
+use super::refusal::StatusError;
 use super::{Intent, RegistrationReport, Trail};
 use crate::bytes::{Reader, Truncated};
 

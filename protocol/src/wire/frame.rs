@@ -1,9 +1,10 @@
 //! Frames, the unit of transmission, and their seals.
 
-use super::WIRE_VERSION;
+use super::address::{Address, MissionId, SessionId};
 use super::chunk::{ChunkKind, Chunks, has_second_byte, push_chunk, to_the_end};
-use super::header::{Address, FrameKind, Header, MissionId, SessionId};
-use crate::bytes::{Reader, Truncated};
+use super::header::{FrameKind, Header};
+use super::refusal::FrameError;
+use crate::bytes::Reader;
 use crate::seal::{Direction, LinkKey, SessionKey, TAG_BYTES, Tag};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc, Digest};
 use std::borrow::Cow;
@@ -12,33 +13,6 @@ use std::borrow::Cow;
 static CRC24: Crc<u32> = Crc::<u32>::new(&CRC_24_OPENPGP);
 /// The check of a numbered frame.
 static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
-
-/// Why received bytes are not a frame for this end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FrameError {
-    /// Too short, or the header exceeds the frame.
-    #[error("the frame is too short")]
-    Truncated,
-    /// The frame has another wire version.
-    #[error("the frame has wire version {0}, this is version {WIRE_VERSION}")]
-    Version(u8),
-    /// The frame is addressed to another end.
-    #[error("the frame is for another address")]
-    NotForUs,
-    /// Damaged, of another mission, or sealed to a session that is not ours.
-    #[error("the checksum or tag does not match")]
-    Checksum,
-    /// A field has a value that no sender writes.
-    #[error("the frame has a field out of range")]
-    BadField,
-}
-
-impl From<Truncated> for FrameError {
-    fn from(_: Truncated) -> Self {
-        Self::Truncated
-    }
-}
 
 /// The end of a frame, which proves its integrity or its authenticity.
 #[derive(Debug, Clone, Copy)]

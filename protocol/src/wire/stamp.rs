@@ -1,12 +1,9 @@
 //! Time stamps, from which each end estimates the propagation time and the other end's clock.
 
-use super::header::Address;
+use super::address::Address;
 use crate::bytes::{Reader, Truncated, put24};
 use crate::time::Instant;
 use std::time::Duration;
-
-/// Bits of a clock reading in milliseconds; it wraps every 4 h 39 min.
-const CLOCK_BITS: u32 = 24;
 
 /// The time of a transmission by the sender's clock.
 ///
@@ -51,15 +48,7 @@ impl Stamp {
 
     /// The clock reading at `now`, as on the wire.
     pub fn clock(now: Instant) -> u32 {
-        (now.as_micros() / 1000) as u32 & ((1 << CLOCK_BITS) - 1)
-    }
-
-    /// The time in microseconds by the clock that showed `clock_ms`, as near to `near_us` as possible.
-    pub fn unwrap_clock(clock_ms: u32, near_us: i64) -> i64 {
-        let turn = 1_000_i64 << CLOCK_BITS;
-        let at = i64::from(clock_ms) * 1000;
-        let turns = (near_us - at + turn / 2).div_euclid(turn);
-        at + turns * turn
+        now.clock_ms()
     }
 
     /// The sender's clock in milliseconds, low 24 bits.
@@ -96,7 +85,6 @@ impl Stamp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     #[test]
     fn golden_bytes_of_both_stamps() {
@@ -108,14 +96,5 @@ mod tests {
         let mut r = Reader::new(&bytes);
         let stamp = Stamp::decode(Address::SURFACE, &mut r).unwrap();
         assert_eq!(stamp, Stamp::Surface { clock_ms: 0x01_0203, one_way: Some(Duration::from_millis(667)) });
-    }
-
-    proptest! {
-        #[test]
-        fn a_clock_unwraps_to_the_nearest_moment(at in 0u64..1 << 50, drift_us in -8_000_000_000i64..8_000_000_000) {
-            let shown = Stamp::clock(Instant::from_micros(at));
-            let near = at as i64 + drift_us;
-            prop_assert_eq!(Stamp::unwrap_clock(shown, near), at as i64 / 1000 * 1000);
-        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::details::{Backlog, DiskReport, EquipmentFaults};
 use super::path::{Placement, PlannedPath};
+use super::refusal::StatusError;
 use super::trail::{Intent, RegistrationReport, TrailCorner};
 use crate::bytes::{Reader, Truncated, decimetres, put24};
 use crate::coordinates::MapPoint;
@@ -196,24 +197,6 @@ pub struct VehicleStatus {
     pub placement: Option<Placement>,
     /// The state of the vehicle's disk; `None` if no report has had it.
     pub disk: Option<DiskReport>,
-}
-
-/// Why bytes are not a status.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum StatusError {
-    /// They are too short or too long.
-    #[error("the status has another length")]
-    Length,
-    /// A field has a value that no vehicle writes.
-    #[error("the status has a field out of range")]
-    BadField,
-}
-
-impl From<Truncated> for StatusError {
-    fn from(_: Truncated) -> Self {
-        Self::Length
-    }
 }
 
 fn take_point(r: &mut Reader<'_>) -> Result<MapPoint, Truncated> {

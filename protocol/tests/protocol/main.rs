@@ -6,7 +6,6 @@ mod forgery;
 mod fuzz_corpus;
 mod in_force;
 mod layers;
-mod map_coding;
 mod pair;
 mod path;
 mod promises;

@@ -5,7 +5,8 @@
 //! paper, but label borders move to where the colour changes. It is the contrast term of image segmentation
 //! (Boykov and Jolly, ICCV 2001).
 
-use super::cells::NONE;
+/// The id of an absent cell or neighbour.
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Classes of squared distances: eight for each factor of two from 2^-16 on. Class 0 stands for an unknown distance.
 const CLASSES: usize = 256;

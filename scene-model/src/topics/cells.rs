@@ -1,6 +1,6 @@
 //! The cells of the world: their words with labels, label counts and neighbours; from positions to cells by a spatial hash.
 
-use super::affinity::Affinity;
+use super::affinity::{Affinity, NONE};
 use super::labels::{LANES, Lanes, UNLABELLED, label_of, pack, word_of};
 use crate::random::mix;
 
@@ -156,9 +156,6 @@ fn add_counts(sum: &mut [Lanes], counts: &[u16], weight: f32) {
         }
     }
 }
-
-/// The id of an absent cell or neighbour.
-pub(crate) const NONE: u32 = u32::MAX;
 
 /// Cell coordinates in x, y, z.
 pub(crate) type Coord = [i32; 3];

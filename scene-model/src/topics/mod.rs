@@ -21,6 +21,7 @@ mod label_map;
 mod labels;
 mod model;
 mod sampler;
+mod snapshot;
 
 pub use cells::{centre_of, coord_of};
 pub use checkpoint::CheckpointError;

@@ -3,12 +3,12 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::cells::{Cells, centre_of, coord_of};
-use super::checkpoint::Snapshot;
 use super::config::{ConfigError, SceneConfig};
 use super::kernel::Kernel;
 use super::label_map::{FlatCell, MapCache};
 use super::labels::{Labels, TopicId, word_of};
 use super::sampler::{MixedSchedule, SamplerPool, phase_words};
+use super::snapshot::Snapshot;
 use crate::project::Observation;
 use crate::random::{CounterRng, derive};
 

@@ -1,6 +1,5 @@
 //! The visual word, the number of words of each kind, and where in a frame they are sampled.
 
-use super::{binary, colour, context, texture};
 use serde::{Deserialize, Serialize};
 
 /// The number of words of each kind in a cell, and the length of the warm-up.
@@ -28,20 +27,6 @@ impl Default for WordConfig {
     fn default() -> Self {
         Self { colour: 36, context: 9, spread: 9, texture: 9, binary: 4, warm_up_frames: 16 }
     }
-}
-
-impl WordConfig {
-    /// Returns the number of different words (V); it does not depend on the configuration.
-    #[must_use]
-    pub fn vocabulary_size(&self) -> u32 {
-        first_id(5)
-    }
-}
-
-/// The first id of the `kind`-th vocabulary, from 0: colour, context, spread, texture, binary, end.
-pub(super) fn first_id(kind: usize) -> u32 {
-    let sizes = [colour::SIZE, context::SIZE, context::SPREAD_SIZE, texture::SIZE, binary::SIZE];
-    sizes.iter().take(kind).sum()
 }
 
 /// A visual word and its position in the frame.

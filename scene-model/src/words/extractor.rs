@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::binary::BinaryWords;
 use super::colour::{ColourField, ColourWords};
-use super::config::{Word, WordConfig, first_id};
+use super::config::{Word, WordConfig};
 use super::context::{ContextWords, SpreadWords};
 use super::discriminant::{Discriminant, MEASURES, MeasuredPlace};
 use super::flat_field::{Moments, Stretch};
 use super::grey_plane::GreyPlane;
+use super::ids::first_id;
 use super::texture::TextureWords;
 
 /// The tone stretch, means and deviations that features are compared with to become words.

@@ -13,6 +13,7 @@ mod discriminant;
 mod extractor;
 mod flat_field;
 mod grey_plane;
+mod ids;
 mod texture;
 
 pub use colour::lab as cie_lab;

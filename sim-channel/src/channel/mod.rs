@@ -5,8 +5,8 @@ mod link;
 pub mod presets;
 mod reception;
 
-pub use config::ChannelConfig;
-pub use link::{Interferer, Outage, OutageScope};
+pub use config::{ChannelConfig, Outage, OutageScope};
+pub use link::Interferer;
 pub use reception::{Arrival, LossReason, Onset, ReceptionOutcome};
 
 use crate::loss::{FrameContext, FrameFate, LossModel};

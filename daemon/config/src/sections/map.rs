@@ -1,6 +1,7 @@
 //! The map's stream, the camera and the scene model.
 
-use crate::key::{ANY, range, section};
+use super::key::section;
+use crate::rule::{ANY, range};
 use crate::setting::{
     BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce, DepthSource, LabelSource, LayerName,
     MapCells, SceneLabels, Votes,

@@ -3,6 +3,7 @@
 //! The structs, `scenecast config`, the files in `config/`, the reference in `docs/` and the JSON Schema are made from
 //! these tables.
 
+pub(crate) mod key;
 mod map;
 mod modem;
 mod node;
@@ -13,7 +14,7 @@ pub use modem::{Channel, Link, Modem};
 pub use node::{Console, Mission, Operator, Record, Ros2, Runtime, SurfaceSection, VehicleSection, WorldSection};
 pub use survey::{Autopilot, Navigation, Position, Registration, Survey};
 
-use crate::key::Section;
+use key::Section;
 
 /// The settings of a process, by section; the default is that of the files in `config/`.
 #[derive(Debug, Clone, PartialEq, Default)]

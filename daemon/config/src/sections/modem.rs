@@ -1,6 +1,7 @@
 //! The acoustic link, the modem, and the simulated channel between modems.
 
-use crate::key::{ANY, range, section};
+use super::key::section;
+use crate::rule::{ANY, range};
 use crate::setting::{Authenticate, HostPort, ModemKind, S2cMode};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use std::path::PathBuf;

@@ -1,6 +1,7 @@
 //! The mission, the vehicle, the processes, and ROS 2.
 
-use crate::key::{ANY, range, section};
+use super::key::section;
+use crate::rule::{ANY, range};
 use crate::setting::{
     HostPort, OperatorScript, PageOrigin, Remap, RestoreOrders, RosName, RosTransport, WorldKind, ZenohEndpoint,
 };

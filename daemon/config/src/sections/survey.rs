@@ -1,6 +1,7 @@
 //! The survey, the vehicle's navigation, autopilots and the localisation relay.
 
-use crate::key::{ANY, ports, range, section};
+use super::key::section;
+use crate::rule::{ANY, ports, range};
 use crate::setting::{AutopilotKind, GpsPort, NavigationSource, StartMode};
 use scenecast_core::{Area, PortAddress};
 use scenecast_protocol::directive::{AtEnd, PlannerKind, Reaction};

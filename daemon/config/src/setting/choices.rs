@@ -1,7 +1,7 @@
 //! Values that are one of some words.
 
 use super::{Setting, one_of};
-use crate::key::Rule;
+use crate::rule::Rule;
 use scenecast_protocol::directive::{AtEnd, CellBand, PlannerKind, Reaction};
 use scenecast_protocol::map_codec::Codec;
 use strum::{Display, IntoStaticStr, VariantArray};

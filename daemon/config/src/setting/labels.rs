@@ -1,7 +1,7 @@
 //! Where the labels of the map come from, how they vote, and how long values of cells are held back.
 
 use super::{HostPort, RosName, Setting, different, one_of, read_different};
-use crate::key::Rule;
+use crate::rule::Rule;
 use scenecast_protocol::map::Hold;
 use serde_json::json;
 use std::path::PathBuf;
@@ -225,8 +225,8 @@ impl Setting for Debounce {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::key::ANY;
     use crate::load;
+    use crate::rule::ANY;
 
     #[test]
     fn sources_of_labels_read_back() {

@@ -19,7 +19,7 @@ pub use ros2::{Remap, RosName, ZenohEndpoint};
 pub use sources::{CalibrationSource, CameraSource, DepthSource, NavigationSource};
 pub use tables::LayerName;
 
-use crate::key::Rule;
+use crate::rule::Rule;
 use serde_json::json;
 use toml::Value;
 

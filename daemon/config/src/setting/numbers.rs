@@ -1,7 +1,7 @@
 //! Numbers, flags, lists of numbers, places.
 
 use super::{Setting, unit};
-use crate::key::Rule;
+use crate::rule::Rule;
 use scenecast_core::{Area, LatLon};
 use serde_json::json;
 use toml::Value;

@@ -1,7 +1,7 @@
 //! Ports of instruments, as in `serial:DEVICE:BAUD`, and network addresses.
 
 use super::{Setting, different, read_different};
-use crate::key::Rule;
+use crate::rule::Rule;
 use scenecast_core::PortAddress;
 use scenecast_core::gps::GpsLanguage;
 use serde_json::json;
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn a_port_is_written_as_it_was_read() {
-        let rule = crate::key::ports(&["serial", "udp", "udp-to", "tcp", "gpsd", "file"]);
+        let rule = crate::rule::ports(&["serial", "udp", "udp-to", "tcp", "gpsd", "file"]);
         for text in ["serial:/dev/x:9600", "udp:0.0.0.0:1", "udp-to:host:2", "tcp:host:3", "file:a/b", "gpsd:h:4", ""] {
             let value = Value::String(text.to_owned());
             assert_eq!(Option::<GpsPort>::read(&value, &rule).unwrap().write(), value);

@@ -1,7 +1,7 @@
 //! Names and networks of ROS 2.
 
 use super::{Setting, different, read_different};
-use crate::key::Rule;
+use crate::rule::Rule;
 use serde_json::json;
 use std::fmt;
 use std::net::IpAddr;

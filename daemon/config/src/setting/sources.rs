@@ -1,7 +1,7 @@
 //! Where images and poses come from: a kind, a colon, and a folder, a command or an address.
 
 use super::Setting;
-use crate::key::Rule;
+use crate::rule::Rule;
 use serde_json::json;
 use std::path::PathBuf;
 use toml::Value;
@@ -153,7 +153,7 @@ impl CameraSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::key::ANY;
+    use crate::rule::ANY;
 
     #[test]
     fn a_source_is_a_kind_and_a_place() {

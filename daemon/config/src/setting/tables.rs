@@ -1,7 +1,7 @@
 //! Names of layers and tables by these names; shares by class, and the order of the background streams.
 
 use super::{Setting, different, one_of, read_different, unit};
-use crate::key::Rule;
+use crate::rule::Rule;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerId, LayerSet};
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Class, Shares};
 use serde_json::json;

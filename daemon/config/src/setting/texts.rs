@@ -1,7 +1,7 @@
 //! Names, files, and lists of vehicles' addresses.
 
 use super::{Setting, different, read_different, unit};
-use crate::key::Rule;
+use crate::rule::Rule;
 use serde_json::json;
 use std::path::PathBuf;
 use toml::Value;

@@ -1,7 +1,6 @@
 //! The classes of a map for programs that annotate images: COCO and TagLab.
 
-use super::ExportError;
-use super::files::check_picture;
+use super::{ExportError, check_picture};
 use scenecast_protocol::map::{Cell, Rect, UNEXPLORED};
 use scenecast_surface::{MapCaption, MapCells};
 use serde_json::{Value, json};

@@ -1,11 +1,11 @@
 //! The file formats of a map: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
 
-use super::ExportError;
 use super::annotations::{coco, tag_lab};
 use super::cells::{ExploredCell, explored};
-use super::geotiff::{Reference, geotiff};
+use super::geotiff::{Reference, escaped, geotiff};
 use super::projection::{TransverseMercator, well_known_text};
 use super::regions::{Polygon, regions};
+use super::{ExportError, check_picture};
 use scenecast_core::label_picture;
 use scenecast_protocol::map::{Cell, LabelGrid, Quantity, Rect};
 use scenecast_surface::state::{Origin, VehicleMarker, seconds};
@@ -14,15 +14,6 @@ use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-
-/// Whether the map is small enough for a picture. The error is one line for people.
-pub(super) fn check_picture(cells: &MapCells) -> Result<(), ExportError> {
-    let Rect { width, height, .. } = cells.rectangle();
-    if cells.rectangle().area() > label_picture::MAX_CELLS {
-        return Err(ExportError::LargePicture { width, height });
-    }
-    Ok(())
-}
 
 /// An indexed PNG, north up, pixel value = label. A PNG has no empty tiles, so its extent is limited.
 pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, ExportError> {
@@ -60,11 +51,6 @@ pub(super) fn companion(cells: &MapCells, projection: Option<String>) -> String 
         "<PAMDataset>\n{srs}{facts}  <PAMRasterBand band=\"1\">\n    <NoDataValue>0</NoDataValue>\n    <CategoryNames>\n{classes}    \
          </CategoryNames>\n  </PAMRasterBand>\n</PAMDataset>\n"
     )
-}
-
-/// A text as XML has it.
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Regions of equal label, and markers: WGS 84 if the mission has an origin, else metres east and north of it.

@@ -4,7 +4,6 @@
 //! that the size of the file grows with the cells and not with their extent.
 
 use super::ExportError;
-use super::files::escaped;
 use super::projection::TransverseMercator;
 use super::tiff::Directory;
 use flate2::Compression;
@@ -344,6 +343,11 @@ fn deflate(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes)?;
     encoder.finish()
+}
+
+/// A text as XML has it.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

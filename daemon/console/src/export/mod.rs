@@ -10,6 +10,8 @@ mod tiff;
 
 use geotiff::{MAX_TILES, TILE};
 use scenecast_core::label_picture::{self, PictureError};
+use scenecast_protocol::map::Rect;
+use scenecast_surface::MapCells;
 
 pub(crate) use cells::map_body;
 pub use files::MapFormat;
@@ -46,4 +48,13 @@ pub enum ExportError {
     Picture(#[from] PictureError),
     #[error(transparent)]
     Io(#[from] std::io::Error),
+}
+
+/// Whether the map is small enough for a picture. The error is one line for people.
+fn check_picture(cells: &MapCells) -> Result<(), ExportError> {
+    let Rect { width, height, .. } = cells.rectangle();
+    if cells.rectangle().area() > label_picture::MAX_CELLS {
+        return Err(ExportError::LargePicture { width, height });
+    }
+    Ok(())
 }

@@ -1,6 +1,6 @@
 //! The events of a record for its time line.
 
-use super::recording::Recording;
+use crate::recording::Recording;
 use scenecast_messages::contents::valid_part;
 use scenecast_surface::LogKind;
 use scenecast_surface::state::ReplayEvent;

@@ -1,14 +1,9 @@
 //! The replay of a mission from its records: the state that the page shows at any moment of it, as each side knew it.
 
 mod events;
-mod map;
 mod on_board;
-mod recording;
 
-pub(crate) use map::ShownMap;
-pub use recording::Recording;
-pub(crate) use recording::{FrameCounts, Known, StateText};
-
+use crate::recording::{Known, Recording};
 use crate::report::{Dive, HTML};
 use scenecast_messages::contents::{Stamps, valid_part};
 use scenecast_messages::scenecast_msgs::Event;

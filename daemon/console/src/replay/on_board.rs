@@ -1,6 +1,6 @@
 //! What a vehicle knew, as the page shows it.
 
-use super::recording::Known;
+use crate::recording::Known;
 use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_protocol::wire::VehicleMode;
 use scenecast_surface::state::{MapLabel, PlannedPath, ReportedMode, ReportedPose, StatusReport, VehicleState};

@@ -1,8 +1,8 @@
 //! The report with the files of the map, its images and its tables, as one ZIP archive.
 
 use super::dive::{Dive, DiveVehicle};
-use super::orders::OrderStep;
-use super::track::TrackPoint;
+use super::order_step::OrderStep;
+use super::track_point::TrackPoint;
 use super::words;
 use crate::export::{MapFormat, harmless};
 use scenecast_core::{UserError, utc_text};

@@ -1,6 +1,6 @@
 //! The areas of classes with their intervals, from the model's confidence in each cell.
 
-use crate::replay::ShownMap;
+use crate::recording::ShownMap;
 use scenecast_protocol::map::{Cell, LayerReplica, MAX_LABEL};
 use std::collections::BTreeMap;
 

@@ -2,7 +2,7 @@
 
 use super::Escaped;
 use super::dive::DiveVehicle;
-use super::track::TrackPoint;
+use super::track_point::TrackPoint;
 use scenecast_core::{Area, utc_text};
 use scenecast_protocol::map::Rect;
 use scenecast_surface::state::VehicleState;

@@ -85,7 +85,7 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<Str
 
 #[cfg(test)]
 mod tests {
-    use super::super::track::TrackPoint;
+    use super::super::track_point::TrackPoint;
     use super::*;
 
     #[test]
@@ -112,8 +112,7 @@ mod tests {
         };
         let told = |sigmas: &[f64]| {
             let track = sigmas.iter().enumerate().map(at).collect();
-            let mut vehicle = DiveVehicle::default();
-            vehicle.track = track;
+            let vehicle = DiveVehicle { track, ..DiveVehicle::default() };
             place(&dive, &VehicleState::default(), &vehicle)
         };
         assert_eq!(told(&[1.0, 4.9, f64::NAN]), None);

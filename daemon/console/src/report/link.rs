@@ -4,7 +4,7 @@ use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
 use super::words::{self, counted};
-use crate::replay::FrameCounts;
+use crate::recording::FrameCounts;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Link;
 use scenecast_surface::state::{LinkDirection, LinkSummary, VehicleState};
@@ -325,8 +325,8 @@ mod tests {
         let link = |(at_s, bps, budget_bps): (f64, f32, u32)| {
             (at_s, Link { received_bps: bps, budget_bps, ..Link::default() })
         };
-        let mut vehicle = DiveVehicle::default();
-        vehicle.link = [(0.0, 900.0, 4000), (70.0, 180.0, 4000), (90.0, 60.0, 2500)].map(link).to_vec();
+        let link = [(0.0, 900.0, 4000), (70.0, 180.0, 4000), (90.0, 60.0, 2500)].map(link).to_vec();
+        let vehicle = DiveVehicle { link, ..DiveVehicle::default() };
         let mut page = String::new();
         dive.frames_and_bytes(&mut page, &VehicleState::default(), &vehicle);
         let row = "1250</td><td class=\"n\">100 bit/s</td><td class=\"n\">180 bit/s</td><td>not known</td>";

@@ -1,8 +1,8 @@
 //! The log of a dive: what the surface logged, and what vehicles recorded of themselves.
 
-use super::dive::seconds;
+use super::seconds;
 use super::words::{self, NO_ORDER};
-use crate::replay::Recording;
+use crate::recording::Recording;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Event;
 use scenecast_protocol::directive::SlotId;

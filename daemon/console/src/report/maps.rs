@@ -1,7 +1,7 @@
 //! The maps of both ends over the time of a dive, and how far the operator's was behind.
 
-use super::dive::seconds;
-use crate::replay::{Known, Recording, ShownMap};
+use super::seconds;
+use crate::recording::{Known, Recording, ShownMap};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_surface::state::VehicleChannel;

@@ -10,18 +10,22 @@ mod gaps;
 mod link;
 mod log;
 mod maps;
+mod order_step;
 mod orders;
 mod page;
+mod read;
 mod restart;
 mod settings;
 mod summary;
 mod times;
 mod track;
+mod track_point;
 mod trouble;
 mod words;
 
 pub use dive::Dive;
 
+use scenecast_messages::builtin_interfaces::Time;
 use scenecast_surface::Reply;
 use std::path::PathBuf;
 
@@ -44,6 +48,15 @@ pub fn report_reply(records: &[PathBuf]) -> Reply {
 }
 
 use std::fmt;
+
+fn seconds(nanos: u64) -> f64 {
+    nanos as f64 / 1e9
+}
+
+/// A time of a message, seconds since 1970.
+fn unix_s(time: &Time) -> f64 {
+    time.nanos() as f64 / 1e9
+}
 
 /// Displays a text as part of HTML: special characters escaped, control and invisible characters left out.
 struct Escaped<'a>(&'a str);

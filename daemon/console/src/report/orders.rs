@@ -1,7 +1,8 @@
 //! The orders of a dive: what was ordered, by whom, and what became of it.
 
 use super::dive::{Dive, DiveVehicle};
-use super::{Escaped, words};
+use super::order_step::{OrderKey, OrderStep};
+use super::{Escaped, unix_s, words};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::OrderStatus;
 use scenecast_protocol::directive::SlotId;
@@ -13,35 +14,7 @@ use std::fmt::Write;
 /// The longest content of an order that is told whole, bytes.
 const MAX_CONTENT: usize = 2000;
 
-/// An order by the name of its slot and its version.
-pub(super) type OrderKey = (String, u32);
-
-/// A status of an order.
-#[derive(Debug, Clone)]
-pub(super) struct OrderStep {
-    pub(super) at_s: f64,
-    pub(super) given_s: f64,
-    pub(super) status: u8,
-    pub(super) reason: String,
-    /// Whether only the vehicle's own record has it.
-    pub(super) is_own: bool,
-}
-
 impl OrderStep {
-    pub(super) fn of(message: &OrderStatus) -> Self {
-        Self {
-            at_s: words::unix_s(&message.header.stamp),
-            given_s: words::unix_s(&message.given),
-            status: message.status,
-            reason: message.reason.clone(),
-            is_own: false,
-        }
-    }
-
-    pub(super) fn is_end(&self) -> bool {
-        matches!(self.status, OrderStatus::APPLIED | OrderStatus::REFUSED | OrderStatus::WITHDRAWN)
-    }
-
     /// The status with its reason, for people.
     fn told(&self) -> String {
         let reason = if self.reason.is_empty() { String::new() } else { format!(": {}", self.reason) };
@@ -134,7 +107,7 @@ impl Dive {
     pub(super) fn ordered(&self, state: &VehicleState, vehicle: &DiveVehicle, order: &OrderKey) -> (String, String) {
         let known = vehicle.given.get(order).zip(vehicle.content(state, order));
         let Some((given, content)) = known else { return (String::new(), "not recorded".to_owned()) };
-        let given_s = words::unix_s(&given.header.stamp);
+        let given_s = unix_s(&given.header.stamp);
         // Several orders may be given within a second: the words are those of the nearest one in this slot.
         let logged = self.events.iter().filter_map(|(at_s, event)| {
             let is_of_it = event.vehicle == state.name || event.vehicle.is_empty();

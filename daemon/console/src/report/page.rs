@@ -362,7 +362,7 @@ fn image(
         false => format!("{}, shown as {}", own, words::label(&state.label_book, class)),
     };
     let place = || {
-        let sigma = vehicle.sigma_m(words::unix_s(&exemplar.taken)).filter(|_| vehicle.measures_sigma());
+        let sigma = vehicle.sigma_m(super::unix_s(&exemplar.taken)).filter(|_| vehicle.measures_sigma());
         let sigma = sigma.map_or_else(String::new, |m| format!(", \u{b1} {m:.1} m"));
         let on_earth = words::on_earth(dive, (middle.x, middle.y));
         format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))

@@ -1,18 +1,8 @@
 //! How far restarts of a vehicle's program set its map back.
 
-use super::dive::Dive;
-use crate::replay::Recording;
+use super::dive::{Dive, SetBack};
+use crate::recording::Recording;
 use scenecast_protocol::map::Cell;
-
-/// The map of a vehicle before a restart of its program and after it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SetBack {
-    /// Cells before, and those that had the same label after.
-    cells: u64,
-    kept: u64,
-    /// The age of the oldest change that was lost, when the record stops, mission seconds.
-    lost_s: f64,
-}
 
 /// The map at each restart of a vehicle by its own record; `None` where that has no map soon after it.
 pub(super) fn set_backs(recording: &mut Recording, part: &str) -> Vec<Option<SetBack>> {
@@ -66,7 +56,7 @@ impl SetBack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::replay::Known;
+    use crate::recording::Known;
     use scenecast_messages::scenecast_msgs::MapCells;
 
     const SECOND: u64 = 1_000_000_000;
@@ -78,8 +68,8 @@ mod tests {
 
     /// A run with a map that changed at 10 s and at 30 s and ended at 40 s, and one that began with these cells at 60 s.
     fn set_back(after: &[(i32, u8)]) -> SetBack {
-        let mut own = Known::default();
-        own.runs = vec![(0, 40 * SECOND), (60 * SECOND, 90 * SECOND)];
+        let runs = vec![(0, 40 * SECOND), (60 * SECOND, 90 * SECOND)];
+        let mut own = Known { runs, ..Known::default() };
         own.map.take(0, change(true, &[(0, 1), (1, 1), (2, 1)]));
         own.map.take(10 * SECOND, change(false, &[(0, 2)]));
         own.map.take(30 * SECOND, change(false, &[(3, 4)]));

@@ -2,7 +2,7 @@
 
 use super::dive::{Dive, DiveVehicle};
 use super::maps::MapsAt;
-use super::orders::OrderStep;
+use super::order_step::OrderStep;
 use super::words::{self, area, counted, interval, on_earth};
 use super::{extent, gaps, trouble};
 use scenecast_core::utc_text;

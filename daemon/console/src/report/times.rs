@@ -1,6 +1,7 @@
 //! Times of a dive in words: those of the clock, and of the mission where it was played at another speed.
 
-use super::dive::{Dive, seconds};
+use super::dive::Dive;
+use super::seconds;
 use super::words::duration;
 
 /// Whether a mission of this speed is not as fast as the clock.

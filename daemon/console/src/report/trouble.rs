@@ -1,7 +1,7 @@
 //! What went wrong in a dive, and what it did by order or because of a limit.
 
+use super::dive::SetBack;
 use super::dive::{Dive, DiveVehicle};
-use super::restart::SetBack;
 use super::{gaps, words};
 use scenecast_core::utc_text;
 use scenecast_messages::contents::valid_part;

@@ -3,9 +3,8 @@
 use super::areas::ClassArea;
 use super::dive::{Dive, DiveVehicle};
 use crate::export::TransverseMercator;
-use crate::replay::FrameCounts;
+use crate::recording::FrameCounts;
 use scenecast_core::utc_text;
-use scenecast_messages::builtin_interfaces::Time;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::state::{Origin, VehicleState};
@@ -328,11 +327,6 @@ pub(super) fn on_earth(dive: &Dive, (east_m, north_m): (f64, f64)) -> String {
 /// The origin of a mission on the globe.
 pub(super) fn origin(origin: Origin) -> String {
     format!("latitude {:.6}, longitude {:.6} (WGS 84)", origin.lat_deg, origin.lon_deg)
-}
-
-/// A time of a message, seconds since 1970.
-pub(super) fn unix_s(time: &Time) -> f64 {
-    time.nanos() as f64 / 1e9
 }
 
 pub(super) fn lat_lon(origin: Origin, east_m: f64, north_m: f64) -> (f64, f64) {

@@ -8,6 +8,7 @@
 //! | [`PortListener`] | what is wrong at a port whose modem does not get ready |
 //! | [`Station`] | a driver as the link sees it, shared by rehearsals and processes |
 
+mod configured;
 mod driver;
 pub mod framing;
 mod listener;
@@ -16,8 +17,7 @@ pub mod paced;
 pub mod s2c;
 mod station;
 
-pub use driver::{
-    Class, Destination, Driver, Event, Reception, Refusal, Token, address_book, driver, modem_of_process,
-};
+pub use configured::{address_book, driver, modem_of_process};
+pub use driver::{Class, Destination, Driver, Event, Reception, Refusal, Token};
 pub use listener::{PortFinding, PortListener, Speaker};
 pub use station::{AddressBook, ModemEvent, PIPE_FRAMING_BITS, Station};

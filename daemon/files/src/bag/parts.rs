@@ -1,10 +1,11 @@
 //! The files of a bag: which there are, in which order, and which are missing or of another format.
 
-use super::stream::ZSTD;
 use scenecast_core::UserError;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+
+pub(super) const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
 
 /// Largest `metadata.yaml`, bytes.
 const MAX_METADATA: u64 = 1 << 20;

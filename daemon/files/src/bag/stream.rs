@@ -1,7 +1,7 @@
 //! The messages of an MCAP file, one after the other, with bounded memory. Chunks and single messages may be compressed. A chunk that is
 //! damaged is left out, and what follows is read.
 
-use super::parts::{check_format, gaps, mcap_files};
+use super::parts::{ZSTD, check_format, gaps, mcap_files};
 use mcap::McapError;
 use mcap::records::{Channel, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -288,7 +288,6 @@ fn unpacked(bytes: Vec<u8>) -> std::io::Result<Vec<u8>> {
 
 /// Size of the largest message, bytes.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
-pub(super) const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
 
 fn reader() -> LinearReader {
     // A recorder without power leaves a file without its end; chunks that are whole are read.

@@ -1,7 +1,7 @@
 //! The link's efficiency under a budget below the channel's capacity, and its use of that budget.
 
 use super::bench::{LinkBench, LinkSetting};
-use super::golden::{budget_use, round};
+use super::figures::{budget_use, round};
 use scenecast_protocol::link::IssueError;
 use serde::Serialize;
 use sim_channel::LossModel;

@@ -1,7 +1,7 @@
 //! Fourteen vehicles that share one medium and are all unknown at the start.
 
 use super::bench::{LinkBench, LinkSetting};
-use super::golden::{budget_use, round};
+use super::figures::{budget_use, round};
 use crate::virtual_time::VirtualTime;
 use scenecast_protocol::time::Instant;
 use serde::Serialize;

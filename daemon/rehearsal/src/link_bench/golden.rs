@@ -1,12 +1,12 @@
 //! All measurements of the link in virtual time, as a golden table with one row for each setting.
 
-use super::bench::{BIT_RATE_BPS, LinkBench, LinkSetting, WINDOW};
+use super::bench::{BIT_RATE_BPS, LinkBench, LinkSetting};
 use super::budgets::{BudgetRow, measure_budgets};
+use super::figures::{budget_use, round};
 use super::fleet::{FleetRow, measure_fleet};
 use super::ranging::{RangingRow, measure_ranging};
 use super::trial::{Flow, LinkEffort};
 use scenecast_protocol::link::IssueError;
-use scenecast_protocol::schedule::Audit;
 use serde::Serialize;
 use sim_channel::{LossModel, RandomStream, presets};
 use std::time::Duration;
@@ -152,19 +152,7 @@ impl LinkCase {
     }
 }
 
-/// Ratio of the fullest window of any transmitter to the budget of a window plus one transmission.
-pub fn budget_use(bench: &LinkBench) -> f64 {
-    let budget = f64::from(bench.setting().budget_bps) * WINDOW.as_secs_f64();
-    let of = |audit: &Audit| audit.worst_window_bits() as f64 / (budget + audit.largest_bits() as f64);
-    bench.vehicles.iter().map(|v| of(v.host.audit())).fold(of(bench.surface.audit()), f64::max)
-}
-
 fn resyncs(bench: &LinkBench) -> u64 {
     let at_surface = bench.view().map_or(0, |v| v.stats().resyncs);
     at_surface + bench.vehicles.iter().map(|v| v.host.end().stats().resyncs).sum::<u64>()
-}
-
-/// Rounds to a thousandth, the precision of the measurements.
-pub fn round(value: f64) -> f64 {
-    (value * 1000.0).round() / 1000.0
 }

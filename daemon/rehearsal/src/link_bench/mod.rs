@@ -2,6 +2,7 @@
 
 mod bench;
 mod budgets;
+mod figures;
 mod fleet;
 mod golden;
 mod opaque;

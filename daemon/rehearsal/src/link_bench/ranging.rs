@@ -1,7 +1,7 @@
 //! The cost of ranging, and the accuracy of the measured range.
 
 use super::bench::{BIT_RATE_BPS, LinkBench, LinkSetting};
-use super::golden::round;
+use super::figures::round;
 use super::trial::Flow;
 use scenecast_protocol::link::IssueError;
 use serde::Serialize;

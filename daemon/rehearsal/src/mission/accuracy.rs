@@ -7,7 +7,7 @@ use scenecast_core::Area;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::wire::{Placement, VehicleStatus};
-use scenecast_scoring::{PointPair, RigidFit, mutual_information_nats, rms_distance};
+use scenecast_worlds::scoring::{PointPair, RigidFit, mutual_information_nats, rms_distance};
 use serde::Serialize;
 
 /// Root mean square errors of the places of all frames, metres.

@@ -1,13 +1,13 @@
 //! The quality of both maps of a mission over time, layer by layer and in coarse blocks.
 
 use super::{MapInformation, Mission};
-use crate::fidelity::Meter;
+use crate::meter::Meter;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerId, LayerReplica, UNEXPLORED};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_scoring::{MutualInformation, Seams, TimedCell, mutual_information_nats};
 use scenecast_surface::Surface;
 use scenecast_vehicle::Vehicle;
+use scenecast_worlds::scoring::{MutualInformation, Seams, TimedCell, mutual_information_nats};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;

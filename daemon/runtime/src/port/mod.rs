@@ -1,5 +1,6 @@
 //! Ports to modems and instruments: serial, TCP, UDP, files. They move bytes, and are opened again after each failure.
 
+mod carry;
 mod keeper;
 mod tcp;
 mod udp;

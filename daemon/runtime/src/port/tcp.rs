@@ -1,6 +1,6 @@
 //! TCP ports that wait for the other side to connect.
 
-use super::keeper::{PortActivity, carry};
+use super::carry::{PortActivity, carry};
 use super::{FromPort, PortEnds};
 use std::io;
 use std::net::SocketAddr;

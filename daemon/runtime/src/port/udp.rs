@@ -1,6 +1,6 @@
 //! Datagrams with one frame each, for benches, radio links and autopilots.
 
-use super::keeper::{reopening, silence, until};
+use super::carry::{reopening, silence, until};
 use super::{FromPort, PortEnds, ToPort};
 use bytes::Bytes;
 use scenecast_host::FrameOutcome;

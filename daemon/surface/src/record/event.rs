@@ -2,7 +2,8 @@
 //! numbers.
 
 use super::contact::StoredContact;
-use schemars::JsonSchema;
+use crate::label_book::StoredLabel;
+use crate::log::StoredLogEntry;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -71,20 +72,6 @@ pub struct StoredCommandChange {
     pub by: String,
     pub from: Option<String>,
     pub to: Option<String>,
-}
-
-/// An entry of the mission's log.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StoredLogEntry {
-    /// One more than that of the entry before.
-    pub number: u64,
-    pub at: u64,
-    /// The address of the vehicle that it concerns, if one.
-    pub vehicle: Option<u8>,
-    /// 0 order, 1 answer, 2 contact, 3 mode, 4 label, 5 image, 6 record, 7 command.
-    pub kind: u8,
-    pub by: Option<String>,
-    pub text: String,
 }
 
 /// A change of the knowledge about one vehicle. Times are mission times in microseconds.
@@ -237,20 +224,6 @@ pub struct StoredRequest {
     /// Bytes held and bytes in all, while it arrives.
     pub held: (u32, u32),
     pub changed: u64,
-}
-
-/// The operator's name, colour and merging of a label.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
-pub struct StoredLabel {
-    /// The operator's name of the label; null without one.
-    #[serde(default)]
-    pub name: Option<String>,
-    /// The operator's colour of the label, as in `#a0b1c2`; null without one.
-    #[serde(default)]
-    pub colour: Option<String>,
-    /// The label that it is shown as a part of; null without one.
-    #[serde(default)]
-    pub merged_into: Option<u8>,
 }
 
 /// Weights that an operator has set and not sent.

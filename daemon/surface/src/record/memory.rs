@@ -4,11 +4,10 @@ use super::cells::{EarlierMap, FormerLabels, MapCopy};
 use super::contact::StoredContact;
 use super::event::{
     Event, EventKind, EventTime, RunId, StoredBudget, StoredCommand, StoredCommandChange, StoredDraft, StoredImage,
-    StoredIntent, StoredLabel, StoredLogEntry, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest,
-    VehicleEvent,
+    StoredIntent, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
 };
-use crate::label_book::LabelBook;
-use crate::log::make_room;
+use crate::label_book::{LabelBook, StoredLabel};
+use crate::log::{StoredLogEntry, make_room};
 use scenecast_protocol::map::{Cell, LabelTree};
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
@@ -20,8 +19,6 @@ const MAX_TRACK: usize = 500;
 const MAX_NOTES: usize = 200;
 /// Changes of command that are kept.
 pub(crate) const MAX_COMMAND_CHANGES: usize = 32;
-/// Entries that are kept of the mission's log.
-pub(crate) const MAX_LOG: usize = 2000;
 /// The most markers that are kept; a surface sets no more.
 pub(crate) const MAX_MARKERS: usize = 200;
 

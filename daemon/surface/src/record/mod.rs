@@ -5,12 +5,14 @@ mod contact;
 mod event;
 mod memory;
 
+pub use super::label_book::StoredLabel;
+pub use super::log::StoredLogEntry;
 pub use cells::{EarlierMap, MapCopy};
 pub use contact::{StoredContact, StoredRange};
 pub use event::{
     DecodeError, Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredCells, StoredCommand,
-    StoredCommandChange, StoredDraft, StoredImage, StoredIntent, StoredLabel, StoredLogEntry, StoredMarker, StoredNote,
-    StoredOrder, StoredPlaces, StoredRequest, VehicleEvent, decode, encode,
+    StoredCommandChange, StoredDraft, StoredImage, StoredIntent, StoredMarker, StoredNote, StoredOrder, StoredPlaces,
+    StoredRequest, VehicleEvent, decode, encode,
 };
 pub use memory::{Began, SurfaceMemory, VehicleMemory};
-pub(crate) use memory::{MAX_COMMAND_CHANGES, MAX_LOG, MAX_MARKERS};
+pub(crate) use memory::{MAX_COMMAND_CHANGES, MAX_MARKERS};

@@ -8,7 +8,7 @@ use scene_model::words::{Measures, WordConfig, WordExtractor};
 use scenecast_core::{UserError, errln, outln};
 use scenecast_files::read_image;
 use scenecast_files::write_whole;
-use scenecast_scoring::{ClassStatistics, MIN_CLASS_CELLS, train_vocabulary};
+use scenecast_worlds::scoring::{ClassStatistics, MIN_CLASS_CELLS, train_vocabulary};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! A model learns from a source: in sweeps after all input, or online.
 
-use super::run_report::cpu_seconds;
+use super::usage::cpu_seconds;
 use super::{Sighting, WordSource};
 use scene_model::habitats::Habitats;
 use scene_model::topics::{Inserted, SceneModel};

@@ -1,10 +1,12 @@
 //! The scene model over files: sources of words, learning, scoring and output.
 
+mod extent;
 mod learn;
 mod mosaic;
 mod quality;
 mod run_report;
 mod tum;
+mod usage;
 mod words_file;
 
 pub(crate) use learn::{LearningEffort, Schedule, learn, learn_habitats};

@@ -1,14 +1,14 @@
 //! Annotated classes of places or pixels, and the agreement of a model's labels with them.
 
 use super::LabelledMap;
-use super::run_report::around;
+use super::extent::around;
 use super::words_file::{LineFault, Lines};
 use image::{GrayImage, Luma};
 use scene_model::topics::{FlatCell, coord_of};
 use scenecast_core::UserError;
 use scenecast_files::{finite_number, read_classes};
 use scenecast_protocol::map::Rect;
-use scenecast_scoring::{Annotations, LabelGrid, SceneScore, score};
+use scenecast_worlds::scoring::{Annotations, LabelGrid, SceneScore, score};
 use std::collections::BTreeMap;
 use std::path::Path;
 

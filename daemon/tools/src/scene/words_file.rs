@@ -1,6 +1,6 @@
 //! Words from a file: lines `t,x,y,z,w1,w2,...`, read one by one with bounded memory.
 
-use super::run_report::{LargeExtent, rectangle};
+use super::extent::{LargeExtent, rectangle};
 use super::{Sighting, WordSource};
 use scene_model::project::Observation;
 use scene_model::topics::coord_of;

@@ -145,11 +145,12 @@ fn fading(mut values: Vec<f32>, width: usize, fade: f32) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scene_model::random::{CounterRng, derive};
 
     /// Mean log-likelihood of the hidden cells, by the expectation and by the shares of the seen map.
     fn likelihoods(truth: &[u8], width: usize, seed: u64) -> (f64, f64) {
         let mut seen = vec![0u8; truth.len()];
-        let mut chance = sim_channel::RandomStream::new(seed, &[7]);
+        let mut chance = CounterRng::new(derive(seed, 7));
         let height = truth.len() / width;
         for _ in 0..40 {
             let (x, y) = (chance.below(width - 8), chance.below(height - 8));

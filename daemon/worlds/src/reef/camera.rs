@@ -5,25 +5,9 @@ use super::fields::Colour;
 use super::optics::{self, Optics};
 use super::shading::{CREVICE_M, MAX_APRON, SHADOW_M, shade};
 use super::surface::Surface;
+use super::view::View;
 use crate::noise::floor;
 use image::RgbImage;
-
-/// A frame to be taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// The place below the camera, metres east and north.
-    pub x_m: f64,
-    pub y_m: f64,
-    /// Direction of the frame's top, clockwise from north.
-    pub heading_rad: f64,
-    /// Height above the sea floor: the water in between takes and adds light.
-    pub altitude_m: f64,
-    /// Columns and rows of the frame.
-    pub width_px: u32,
-    pub height_px: u32,
-    /// Number of the moment. Snow and noise differ from moment to moment.
-    pub moment: u64,
-}
 
 /// Nodes of the floor are so many pixels apart: the lens and the water blur what is smaller.
 const BLUR: f64 = 1.35;

@@ -2,8 +2,8 @@
 
 use super::fields::{Colour, blend, fbm, ramp, scale};
 use super::ground::Ground;
-use super::layout::{Habitat, Layout};
-use super::scatter::{JitteredLattice, Region};
+use super::layout::{Habitat, Layout, Region};
+use super::scatter::JitteredLattice;
 use scene_model::random::{CounterRng, derive};
 
 /// Distance of neighbouring shoots, metres.

@@ -7,6 +7,15 @@ use scene_model::random::{CounterRng, derive};
 /// The middle of the world, metres.
 const MIDDLE: [f32; 2] = [60.0, 40.0];
 
+/// A rectangle of the world, metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Region {
+    pub west: f32,
+    pub south: f32,
+    pub east: f32,
+    pub north: f32,
+}
+
 /// The shares of the habitats at a position, 0 to 1 each; the rest is sand.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Habitat {

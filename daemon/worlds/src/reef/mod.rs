@@ -17,8 +17,10 @@ mod shading;
 mod surface;
 mod texture;
 mod things;
+mod view;
 
-pub use camera::{ReefCamera, View};
+pub use camera::ReefCamera;
+pub use view::View;
 
 use ground::Ground;
 use image::{GrayImage, RgbImage};

@@ -1,8 +1,8 @@
 //! Water, lamp, lens, sensor, and the camera's balance of colours.
 
 use super::Reef;
-use super::camera::View;
 use super::fields::{Colour, blend, scale};
+use super::view::View;
 use crate::noise::Noise;
 use image::RgbImage;
 use scene_model::random::{CounterRng, derive, mix};

@@ -2,7 +2,7 @@
 
 use super::fields::{Colour, blend, place_number, scale};
 use super::ground::Ground;
-use super::layout::{Habitat, Layout};
+use super::layout::{Habitat, Layout, Region};
 use super::things::{Form, Thing};
 use scene_model::random::{CounterRng, derive, mix};
 
@@ -229,15 +229,6 @@ fn sign(habitat: &Habitat, cluster: f32, rng: &mut CounterRng, _: usize) -> Opti
     let bare = (1.0 - habitat.reef - habitat.rubble - habitat.grass).max(0.0);
     let chance = rng.unit() as f32;
     (chance < 0.10 * bare * cluster).then_some(Choice { form: Form::Pit, tone: [0.36, 0.33, 0.26], aspect: 1.25 })
-}
-
-/// A rectangle of the world, metres.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Region {
-    pub west: f32,
-    pub south: f32,
-    pub east: f32,
-    pub north: f32,
 }
 
 /// A lattice with one place at random in each of its squares.

@@ -5,8 +5,8 @@ use super::corals::branches;
 use super::fields::{Colour, blend};
 use super::grass::blades;
 use super::ground::Slow;
-use super::layout::Habitat;
-use super::scatter::{Region, large_things, small_things};
+use super::layout::{Habitat, Region};
+use super::scatter::{large_things, small_things};
 use super::things::{Form, Thing};
 
 /// Nodes between two places at which the habitats are computed; between these places they are interpolated.

@@ -3,9 +3,8 @@
 use super::WRECK;
 use super::fields::{Colour, blend, fbm, ramp, scale};
 use super::ground::Spot;
-use super::layout::Berth;
+use super::layout::{Berth, Region};
 use super::patterns::patterns;
-use super::scatter::Region;
 use crate::noise::Noise;
 
 /// The growth form of a coral, or the kind of another thing.

@@ -2,8 +2,8 @@
 //! cell.
 
 use crate::grid::{Rect, UNEXPLORED};
-use crate::map_codec::grow::Lattice;
-use crate::map_codec::series::Patch;
+use crate::map_codec::lattice::Lattice;
+use crate::map_codec::patch::Patch;
 
 /// The width of the margin around the patch in which contexts look.
 pub(super) const MARGIN: usize = 3;

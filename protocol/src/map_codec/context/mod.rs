@@ -5,21 +5,21 @@ mod arith;
 mod canvas;
 mod decisions;
 mod model;
+mod prior;
 mod stage;
 pub mod training;
 
-use super::DecodeError;
 use super::header::ChunkHeader;
-use super::series::Patch;
+use super::lattice::Lattice;
+use super::patch::{DecodeError, Patch};
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::Rect;
-use crate::map_codec::grow::Lattice;
 use arith::{BitCoder, Decoder, Encoder};
 use canvas::Canvas;
 use model::Model;
 pub(super) use model::{best_chunk, prefix_chunk, quick_chunk};
+use prior::Prior;
 pub use training::Decision;
-use training::Prior;
 pub(super) use training::trace;
 
 /// The length of the last row.
@@ -112,5 +112,5 @@ fn read_cells(coder: &mut impl BitCoder, base: Lattice<'_>, rect: Rect, last: La
 
 /// The header of a `context` chunk for `rect`.
 fn head(base: Lattice<'_>, rect: Rect) -> ChunkHeader {
-    super::chunk::header_for(base, super::header::Body::Context, rect)
+    ChunkHeader::new(base, super::header::Body::Context, rect)
 }

@@ -4,14 +4,13 @@
 use super::arith::BitCoder;
 use super::canvas::{Canvas, View};
 use super::decisions::{self, CellRun, Recent, Votes};
+use super::prior::Prior;
 use super::stage::{Contexts, Stage};
-use super::training::Prior;
 use super::{LastRow, Reach, head, write};
 use crate::grid::{MAX_LABEL, UNEXPLORED};
-use crate::map_codec::MapChunk;
-use crate::map_codec::chunk::chunk;
-use crate::map_codec::grow::{Growth, Lattice};
-use crate::map_codec::series::Patch;
+use crate::map_codec::grow::Growth;
+use crate::map_codec::lattice::Lattice;
+use crate::map_codec::patch::{MapChunk, Patch};
 
 /// The adaptive state of a chunk, initialised from the prior for each.
 #[derive(Debug, Clone)]
@@ -160,7 +159,7 @@ pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room:
         let goal = if reach.all { cells * room / bytes.len().max(1) } else { reach.cells * 15 / 16 };
         if reach.all {
             let full = bytes.len() * 100 / room;
-            (least, best) = (guess + 1, Some(chunk(&patch, bytes)));
+            (least, best) = (guess + 1, Some(MapChunk::of(&patch, bytes)));
             if full >= FULL_ENOUGH {
                 break;
             }
@@ -204,7 +203,7 @@ pub(in crate::map_codec) fn quick_chunk(
             continue;
         }
         let (length, more) = (bytes.len(), guess + 1 < growth.areas.len());
-        best = Some(chunk(&patch, bytes));
+        best = Some(MapChunk::of(&patch, bytes));
         if !more || length as f64 >= room as f64 * QUICK_ENOUGH {
             break;
         }
@@ -236,7 +235,7 @@ fn write_whole(base: Lattice<'_>, patch: &Patch, room: usize) -> (Vec<u8>, Reach
 /// The chunk for the first cells of `patch`, row by row, as many as fit; `None` if no change fits.
 pub(in crate::map_codec) fn prefix_chunk(base: Lattice<'_>, patch: &Patch, room: usize) -> Option<MapChunk> {
     let (bytes, reach) = write_whole(base, patch, room);
-    if reach.all { Some(chunk(patch, bytes)) } else { cut(base, patch, reach, room) }
+    if reach.all { Some(MapChunk::of(patch, bytes)) } else { cut(base, patch, reach, room) }
 }
 
 /// The chunk for the first `reach.cells` of `patch` or a few less.
@@ -251,7 +250,7 @@ fn cut(base: Lattice<'_>, patch: &Patch, reach: Reach, room: usize) -> Option<Ma
         let last_row = LastRow(cells - (part.rect.height as usize - 1) * width);
         let (bytes, reach) = write(base, &head(base, part.rect), &part, last_row, room * 8);
         if reach.all {
-            return Some(chunk(&part, bytes));
+            return Some(MapChunk::of(&part, bytes));
         }
         cells = reach.cells.min(cells - 1);
     }

@@ -1,7 +1,6 @@
 //! One kind of decision: its contexts, their mixing and a final adaptive probability map (APM, also SSE; Shkarin 2002), in
 //! integers, so that every CPU computes the same.
 
-use super::training::StagePrior;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
@@ -365,6 +364,19 @@ impl BitEstimate {
             self.visits += 1;
         }
     }
+}
+
+/// The state of one kind of decision at the start of a chunk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct StagePrior {
+    /// Estimates of the direct contexts one after another, then the start values of the keyed ones.
+    pub(super) slots: Vec<BitEstimate>,
+    /// Weights of the parallel mixers, in 1/65536.
+    pub(super) weights: Vec<[i32; INPUTS]>,
+    /// Weights of the final mixer, in 1/65536.
+    pub(super) second: Vec<[i32; SETS]>,
+    /// Points of the adaptive probability maps, in 1/2^32.
+    pub(super) apms: Vec<u32>,
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The state that every emulated modem has, and the one implementation of [`Emulator`] on top of it; its tasks in order of time,
 //! and faults on demand.
 
+use super::fault::Fault;
 use super::serial_line::SerialLine;
 use super::{Emulator, HostId, ModemEvent, Transmission};
 use crate::channel::{Arrival, Onset};
@@ -181,28 +182,6 @@ pub(crate) fn crc16(bytes: &[u8]) -> u16 {
         (0..8)
             .fold(crc ^ (u16::from(*byte) << 8), |crc, _| if crc & 0x8000 == 0 { crc << 1 } else { crc << 1 ^ 0x1021 })
     })
-}
-
-/// A fault to inject; durations count from the moment of injection.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub enum Fault {
-    /// Refuses every message for this long, with `BUSY` (S2C) or an error (Micromodem).
-    Busy(Duration),
-    /// Restarts; settings that were not stored and queued messages are lost.
-    Reboot,
-    /// Sends this many bytes of noise to each host.
-    Garbage(u16),
-    /// Drops the rear half of the bytes that are on their way to each host.
-    HalfLine,
-    /// Neither reads nor writes for this long; the bytes that wait come afterwards.
-    Freeze(Duration),
-    /// Uses this address instead of the configured one.
-    WrongAddress(u8),
-    /// The supply fails: a transmission is cut short, then the modem restarts.
-    BrownOut,
-    /// Accepts up to a megabyte of data before it reports a full buffer.
-    BigBuffer,
 }
 
 #[derive(Debug)]

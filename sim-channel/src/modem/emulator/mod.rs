@@ -1,9 +1,10 @@
 //! The interface of every emulated modem, and the parts that all makes of modem share.
 
 pub(crate) mod board;
+mod fault;
 mod serial_line;
 
-pub use board::Fault;
+pub use fault::Fault;
 
 use crate::channel::{Arrival, Onset};
 use std::time::Duration;

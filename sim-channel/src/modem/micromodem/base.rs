@@ -3,9 +3,9 @@
 //! A service (cycles, flexible data, minipackets, detection) borrows this base for the length of one call. The base never
 //! calls a service.
 
-use super::housekeeping::Nvram;
+use super::nvram::Nvram;
 use super::packet::Packet;
-use super::transducer::{PacketSignal, SentPacket, Transmitter};
+use super::transmitter::{PacketSignal, SentPacket, Transmitter};
 use super::{Generation, MicromodemConfig, sentence};
 use crate::modem::emulator::board::ModemBoard;
 use crate::modem::emulator::{ModemEvent, Transmission};

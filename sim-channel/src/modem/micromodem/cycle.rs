@@ -5,7 +5,7 @@ use super::base::{MicromodemBase, MicromodemTask};
 use super::packet::{FSK_MINI, Packet, PacketKind, PacketRate};
 use super::sentence::{NmeaSentence, from_hex, to_hex};
 use super::transducer;
-use super::transducer::{PacketSignal, QueuedPacket};
+use super::transmitter::{PacketSignal, QueuedPacket};
 use std::time::Duration;
 
 /// A packet that the host is filling.

@@ -6,7 +6,7 @@ use super::cycle::TURN_AROUND;
 use super::packet::{Packet, PacketKind, flexible_airtime, flexible_data, flexible_mini_bytes};
 use super::sentence::{NmeaSentence, from_hex, to_hex};
 use super::transducer;
-use super::transducer::{PacketSignal, QueuedPacket};
+use super::transmitter::{PacketSignal, QueuedPacket};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use std::time::Duration;

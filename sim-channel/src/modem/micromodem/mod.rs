@@ -7,21 +7,25 @@ mod base;
 mod cycle;
 mod housekeeping;
 mod minipacket;
+mod nvram;
 mod packet;
 mod sentence;
 mod transducer;
+mod transmitter;
 
 use crate::channel::{Arrival, Onset};
 use crate::modem::emulator::board::{ModemBoard, ModemLogic};
 use crate::modem::emulator::{Fault, HostId, Transmission};
 use base::{MicromodemBase, MicromodemTask};
 use cycle::CycleService;
-use housekeeping::{Nvram, Sleep};
+use housekeeping::Sleep;
+use nvram::Nvram;
 use packet::{Packet, PacketKind, PacketRate};
 use sentence::{HostLine, LineCollector, NmeaSentence};
 use std::collections::BTreeMap;
 use std::time::Duration;
-use transducer::{Detector, PacketSignal, QueuedPacket, SentPacket};
+use transducer::Detector;
+use transmitter::{PacketSignal, QueuedPacket, SentPacket};
 
 /// The generation of a Micromodem.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -6,7 +6,7 @@ use crate::cpu_meter::CpuMeter;
 use image::RgbImage;
 use scene_model::habitats::{Habitats, LabelTree, MeasuredValues, measure};
 use scene_model::project::{DownCamera, Pose};
-use scenecast_scoring::TimedCell;
+use scenecast_worlds::scoring::TimedCell;
 use std::collections::BTreeMap;
 
 /// Columns and rows of a frame, and the pixels between two frames and between two lines.

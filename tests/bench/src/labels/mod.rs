@@ -9,7 +9,7 @@ mod site;
 pub(crate) use command::LabelsBench;
 
 use flight::{Flight, Labelled, Path};
-use scenecast_scoring::{MutualInformation, Seams, mutual_information_nats};
+use scenecast_worlds::scoring::{MutualInformation, Seams, mutual_information_nats};
 use serde::Serialize;
 use site::{Sight, Site};
 use std::collections::BTreeMap;

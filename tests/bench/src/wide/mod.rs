@@ -182,7 +182,8 @@ fn export(cells: &MapCells, format: MapFormat, keep: &mut Keep<'_>) -> Result<Ex
 }
 
 fn median(costs: &[UpdateCost]) -> UpdateCost {
-    let middle = |of: fn(&UpdateCost) -> f64| scenecast_scoring::median(&costs.iter().map(of).collect::<Vec<f64>>());
+    let middle =
+        |of: fn(&UpdateCost) -> f64| scenecast_worlds::scoring::median(&costs.iter().map(of).collect::<Vec<f64>>());
     UpdateCost {
         cells: middle(|c| c.cells),
         link_loop_ms: middle(|c| c.link_loop_ms),

@@ -1,8 +1,8 @@
 //! Who a client is: the login form, which exchanges a token for a cookie, the end of the session, and the client's principal.
 
 use crate::http::access::{COOKIE, PeerAddress};
+use crate::http::page_files::find_page_file;
 use crate::http::response::{error, not_found};
-use crate::http::server;
 use crate::http::shared::Shared;
 use axum::extract::State;
 use axum::extract::rejection::FormRejection;
@@ -14,7 +14,7 @@ use serde::Deserialize;
 use zeroize::Zeroizing;
 
 fn form(message: &str) -> Html<String> {
-    let (_, page) = server::find_page_file("login.html").unwrap_or_default();
+    let (_, page) = find_page_file("login.html").unwrap_or_default();
     Html(String::from_utf8_lossy(page).replace("<!-- message -->", message))
 }
 

@@ -1,7 +1,7 @@
 //! The command line of an S2C modem: one command at a time, its reply, and the lines in between.
 
+use super::jobs::Job;
 use super::line::{Line, LineParser};
-use super::send::Job;
 use super::setup::{S2cConfig, Step};
 use super::{MAX_REPLY_WAIT, REPLY_TIMEOUT};
 use crate::modem::driver::Token;

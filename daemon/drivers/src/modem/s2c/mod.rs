@@ -5,6 +5,7 @@
 //! communicate, and no payload contains a command.
 
 mod dialogue;
+mod jobs;
 mod line;
 mod notice;
 mod receive;
@@ -16,11 +17,11 @@ pub use setup::{BURST_FRAME_BYTES, INSTANT_BYTES, S2cConfig, S2cMode, instant_ai
 
 use super::driver::{Class, Destination, Driver, Event, Refusal, Token, check_length};
 use dialogue::{Dialogue, Pending};
+use jobs::{Job, Jobs};
 use receive::{BurstAirtime, BurstStreams};
 use scenecast_core::ModemAddress;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::time::Instant;
-use send::{Job, Jobs};
 use setup::{Step, Supervision, Verdict};
 use std::collections::VecDeque;
 use std::time::Duration;

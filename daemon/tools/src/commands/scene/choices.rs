@@ -7,7 +7,7 @@ use scenecast_config::Config;
 use scenecast_core::{UserError, outln};
 use scenecast_protocol::map::{Cell, LabelGrid as CodedGrid};
 use scenecast_protocol::map_codec::encode_all;
-use scenecast_scoring::{AnnotatedScene, ClassStatistics, LabelGrid, Method, Trial, median, score};
+use scenecast_worlds::scoring::{AnnotatedScene, ClassStatistics, LabelGrid, Method, Trial, median, score};
 use serde::Serialize;
 
 /// A choice: the number of labels, and whether the words include those learnt from the other images' annotations.

@@ -6,7 +6,7 @@ use crate::annotated_images::{AnnotatedImage, Pair, pairs};
 use clap::Args;
 use scene_model::topics::Kernel;
 use scenecast_core::{UserError, outln};
-use scenecast_scoring::{AnnotatedScene, MeanScore, Method, Trial};
+use scenecast_worlds::scoring::{AnnotatedScene, MeanScore, Method, Trial};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;

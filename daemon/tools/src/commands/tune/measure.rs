@@ -12,7 +12,7 @@ use scenecast_core::tuning_table::{Measurement, Setting};
 use scenecast_protocol::directive::CellBand;
 use scenecast_protocol::map::{self, Cell};
 use scenecast_protocol::map_codec::{Stride, encode_all};
-use scenecast_scoring::{LabelGrid, score};
+use scenecast_worlds::scoring::{LabelGrid, score};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What gives the cells of a survey their labels.

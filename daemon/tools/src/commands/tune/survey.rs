@@ -9,8 +9,8 @@ use scenecast_config::{BirthRule, Config, SceneLabels, WorldKind};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_files::{read_classes, read_image};
-use scenecast_scoring::{Annotations, mosaic_classes};
 use scenecast_worlds::Reef;
+use scenecast_worlds::scoring::{Annotations, mosaic_classes};
 use std::path::Path;
 
 /// Minimum overlap of neighbouring frames and lines, as a share of a frame's edge.

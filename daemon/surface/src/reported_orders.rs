@@ -1,0 +1,70 @@
+//! The orders in force by the vehicle's reports, also those that this surface has not given.
+
+use super::vehicle_record::{SentOrder, VehicleRecord};
+use scenecast_protocol::directive::{OrderStatus, Slot, SlotId};
+use scenecast_protocol::link::{InForce, PeerView};
+use scenecast_protocol::map::MAX_LABEL;
+
+/// The version of an order in force that another surface, or an earlier run of this one, has given.
+const VERSION_OF_OTHERS: u16 = 0;
+
+/// Takes over the contents that the vehicle reports. One that this surface does not know is not shown as in force.
+pub(super) fn follow(record: &mut VehicleRecord, view: &PeerView<'_>) {
+    follow_order(&mut record.fence, SlotId::Fence, view, |slot| match slot {
+        Slot::Fence(fence) => Some(fence.clone()),
+        _ => None,
+    });
+    follow_order(&mut record.limits, SlotId::Limits, view, |slot| match slot {
+        Slot::Limits(limits) => Some(*limits),
+        _ => None,
+    });
+    follow_order(&mut record.areas, SlotId::Areas, view, |slot| match slot {
+        Slot::Areas(areas) => Some(areas.clone()),
+        _ => None,
+    });
+    follow_order(&mut record.destination, SlotId::Destination, view, |slot| match slot {
+        Slot::Destination(destination) => Some(*destination),
+        _ => None,
+    });
+    if let (InForce::Known(Slot::Utility(utility)), None) =
+        (view.in_force(SlotId::Utility), status(view, SlotId::Utility))
+        && utility.epoch == record.epoch
+    {
+        // How many labels there were when another surface sent it is not known.
+        (record.utility, record.weighed) = (utility.clone(), MAX_LABEL);
+    }
+    if let (InForce::Known(Slot::Settings(settings)), None) =
+        (view.in_force(SlotId::Settings), status(view, SlotId::Settings))
+    {
+        record.settings.handle_reported(*settings);
+    }
+}
+
+fn follow_order<T: Clone + Default + PartialEq>(
+    order: &mut SentOrder<T>,
+    id: SlotId,
+    view: &PeerView<'_>,
+    content: impl Fn(&Slot) -> Option<T>,
+) {
+    match view.in_force(id) {
+        InForce::NotReported => {}
+        // An order without content, such as one that lifts the fence, stays as the last one in force.
+        InForce::None => order.in_force = order.in_force.take().filter(|(_, content)| *content == T::default()),
+        InForce::Unknown => order.in_force = None,
+        InForce::Known(slot) => {
+            let Some(content) = content(slot) else { return };
+            if order.in_force.as_ref().is_none_or(|(_, known)| *known != content) {
+                let own = view.slots().find(|slot| slot.id == id && order.sent.as_ref() == Some(&content));
+                order.in_force = Some((own.map_or(VERSION_OF_OTHERS, |slot| slot.version), content.clone()));
+            }
+            if status(view, id).is_none() {
+                order.sent = Some(content);
+            }
+        }
+    }
+}
+
+/// The status of this surface's last order of a kind.
+pub(super) fn status(view: &PeerView<'_>, id: SlotId) -> Option<OrderStatus> {
+    view.slots().find(|slot| slot.id == id).map(|slot| slot.status)
+}
