@@ -1,5 +1,6 @@
 //! Builds a vehicle from a configuration.
 
+use crate::cells::descriptors;
 use crate::{Durable, FailsafePolicy, Footprint, LastPlace, MapSelection, Navigator, Steering, Vehicle};
 use scenecast_config::{
     Config, Debounce, LabelSource, LayerName, MapCells, NavigationSource, cell_m, map_origin, vehicle_address,
@@ -7,7 +8,7 @@ use scenecast_config::{
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
-use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerId, LayerMask, LayerSource};
+use scenecast_protocol::map::{LayerDescriptor, LayerMask, LayerSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
@@ -122,13 +123,5 @@ fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     descriptors(config).zip(LayerName::all()).map(move |((id, built_in), name)| {
         let share = map.layer_shares.get(&name).copied().unwrap_or(0);
         LayerSource::new(id, LayerDescriptor { share, ..built_in }, codec, debounce)
-    })
-}
-
-/// The scales of the built-in layers on this vehicle.
-pub(super) fn descriptors(config: &Config) -> impl Iterator<Item = (LayerId, LayerDescriptor)> {
-    BUILT_IN_LAYERS.iter().map(|layer| match layer.id {
-        LayerId::DEPTH => (layer.id, LayerDescriptor::depth_around(config.survey.depth_m, config.map.depth_step_m)),
-        _ => (layer.id, layer.descriptor.clone()),
     })
 }

@@ -2,6 +2,7 @@
 
 use crate::MapChanges;
 use scene_model::publish::{PublishedCell, in_step};
+use scenecast_config::Config;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, Cell, LayerDescriptor, LayerId};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -117,8 +118,16 @@ impl From<CellChanges<'_>> for MapChanges {
     }
 }
 
+/// The scales of the built-in layers on this vehicle.
+pub(super) fn descriptors(config: &Config) -> impl Iterator<Item = (LayerId, LayerDescriptor)> {
+    BUILT_IN_LAYERS.iter().map(|layer| match layer.id {
+        LayerId::DEPTH => (layer.id, LayerDescriptor::depth_around(config.survey.depth_m, config.map.depth_step_m)),
+        _ => (layer.id, layer.descriptor.clone()),
+    })
+}
+
 /// The scales of the layers, in which most quantities are found to keep their level by one comparison.
-pub(super) struct LayerScales([LayerScale; LAYERS]);
+pub(super) struct LayerScales(BTreeMap<LayerId, LayerScale>);
 
 struct LayerScale {
     descriptor: LayerDescriptor,
@@ -127,17 +136,17 @@ struct LayerScale {
 }
 
 impl LayerScales {
-    /// The scales of these built-in layers, or else their own.
-    pub(super) fn new(descriptors: &BTreeMap<LayerId, LayerDescriptor>) -> Self {
-        Self(BUILT_IN_LAYERS.each_ref().map(|layer| {
-            let descriptor = descriptors.get(&layer.id).unwrap_or(&layer.descriptor).clone();
+    /// The scales on this vehicle.
+    pub(super) fn new(config: &Config) -> Self {
+        let scale = |(id, descriptor): (LayerId, LayerDescriptor)| {
             let kept = (0..=descriptor.levels).map(|level| descriptor.kept_by(level).unwrap_or(0.0..0.0)).collect();
-            LayerScale { descriptor, kept }
-        }))
+            (id, LayerScale { descriptor, kept })
+        };
+        Self(descriptors(config).map(scale).collect())
     }
 
     fn level(&self, id: LayerId, quantity: f64, held: u8) -> u8 {
-        let LayerScale { descriptor, kept } = &self.0[id.index()];
+        let LayerScale { descriptor, kept } = &self.0[&id];
         match kept.get(usize::from(held)).is_some_and(|range| range.contains(&quantity)) {
             true => held,
             false => descriptor.level(quantity, held),
@@ -156,7 +165,9 @@ mod tests {
     }
 
     fn scales() -> LayerScales {
-        LayerScales::new(&BTreeMap::from([(LayerId::DEPTH, LayerDescriptor::depth_around(20.0, 0.5))]))
+        let mut config = Config::default();
+        config.survey.depth_m = 20.0;
+        LayerScales::new(&config)
     }
 
     /// The changes of a map of one cell.

@@ -1,8 +1,10 @@
 //! Changes of the map: what its producers, the scene model and other programs, give the vehicle.
 
+use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_protocol::map::{Cell, ClassEntry, LabelTree, LayerDescriptor, LayerId};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What a producer has changed of the map since its last changes.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -94,6 +96,9 @@ fn replace<T: Copy>(cells: &mut Vec<(Cell, T)>, later: &[(Cell, T)]) {
     let both: BTreeMap<Cell, T> = cells.iter().chain(later).copied().collect();
     *cells = both.into_iter().collect();
 }
+
+/// The best exemplars of each label that has any, the best first.
+pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
 
 /// A producer of the map, with a checkpoint of its own. The configuration selects one for the labels.
 pub trait MapProducer {

@@ -27,12 +27,6 @@ impl<'a> Frame<'a> {
     pub fn viewed(image: &'a RgbImage, pose: Pose, view: &'a View) -> Self {
         Self { image, pose, scale: 1.0, view: Some(view) }
     }
-
-    /// The frame at the place by registration.
-    #[must_use]
-    pub fn placed(&self, at: &crate::RegisteredFrame) -> Self {
-        Self { pose: at.pose, scale: at.scale, ..*self }
-    }
 }
 
 /// The largest tilt of a frame that is compared with others, radians.

@@ -22,12 +22,12 @@ mod track;
 mod vehicle;
 
 pub use assemble::{assemble, link_config};
-pub use changes::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame};
+pub use changes::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame, SharedExemplars};
 pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};
 pub use foreign::{ForeignMap, ForeignRestoreError, ForeignSource};
 pub use frame::Frame;
-pub use mapper::{Mapper, SharedExemplars};
+pub use mapper::Mapper;
 pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use registration::{FoundFrame, RegisteredFrame};
 pub use scenecast_registration::CameraFinding;

@@ -1,10 +1,9 @@
 //! The mapper: from camera frames to the label map.
 
-use super::assemble::descriptors;
 use super::cells::{CellChanges, Cells, LayerScales};
 use super::frame::{Frame, Projection};
 use super::picker::{Judge, PATCH_PX};
-use crate::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame};
+use crate::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame, SharedExemplars};
 use image::RgbImage;
 use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 use scene_model::habitats::{Habitats, LabelTree as HabitatTree, measure};
@@ -26,9 +25,6 @@ const EXEMPLARS_KEPT: usize = 4;
 
 /// Smallest and largest edge of a cell in frames whose view gives the size of their pixels, pixels.
 const CELL_PX: (f32, f32) = (4.0, 400.0);
-
-/// The best exemplars of each label that has any, the best first.
-pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
 
 /// The tree of the labels that are published.
 fn published_tree(habitats: &HabitatTree, book: &LabelBook) -> Option<LabelTree> {
@@ -138,7 +134,7 @@ impl Mapper {
             registrar: registers.then(|| registrar.clone()),
             registers,
             geometry: None,
-            scales: LayerScales::new(&descriptors(config).collect()),
+            scales: LayerScales::new(config),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
             configured: Configured {

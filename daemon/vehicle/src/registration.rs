@@ -47,6 +47,14 @@ fn on_grid(pose: &Pose) -> Pose {
     Pose { x: round(pose.x), y: round(pose.y), z: round(pose.z), yaw_rad: round(pose.yaw_rad) }
 }
 
+impl Frame<'_> {
+    /// The frame at the place by registration.
+    #[must_use]
+    pub fn placed(&self, at: &RegisteredFrame) -> Self {
+        Self { pose: at.pose, scale: at.scale, ..*self }
+    }
+}
+
 impl Mapper {
     /// Places a frame that was taken by dead reckoning, compass and altitude. A vehicle that never registered frames places
     /// it there; one on which registration was switched off continues from the last frame's place by odometry and compass,

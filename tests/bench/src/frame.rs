@@ -8,9 +8,9 @@ use scene_model::project::Pose;
 use scenecast_config::{Config, cell_m, modem_profile};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::time::Instant;
-use scenecast_scoring::median;
 use scenecast_tools::Progress;
 use scenecast_vehicle::{Durable, Frame, Mapper, Vehicle};
+use scenecast_worlds::scoring::median;
 use serde::Serialize;
 use std::time::Duration;
 

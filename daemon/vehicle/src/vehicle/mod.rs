@@ -24,9 +24,8 @@ pub use durable::{Durable, KeptKeys, LostOrders};
 pub use evidence::{Evidence, MappedFrame};
 pub use storing::VehicleDisk;
 
-use super::changes::MapChanges;
+use super::changes::{MapChanges, SharedExemplars};
 use super::failsafe::FailsafePolicy;
-use super::mapper::SharedExemplars;
 use super::navigator::Navigator;
 use super::registration::{RegisteredFrame, RegistrationMonitor};
 use super::steering::Steering;

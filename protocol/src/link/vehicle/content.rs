@@ -1,49 +1,16 @@
 //! The content of the vehicle's frames: chosen and encoded when a frame is written.
 
 use super::config::OversizedChunk;
-use super::in_force::{InForceSender, SentPart};
-use super::layers::LayerOut;
+use super::in_force::InForceSender;
+use super::parts::{Carried, LayerOut, Part};
 use super::status::StatusSender;
 use crate::directive::{SLOTS, SlotReport};
-use crate::map::{ClassSource, LayerCarried, LayerId, StateSource, TreeSource};
-use crate::object::{ObjectId, ObjectSender, SymbolRun};
+use crate::map::{ClassSource, StateSource, TreeSource};
+use crate::object::{ObjectId, ObjectSender};
 use crate::schedule::{BackgroundOrder, BackgroundStream, BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
 use crate::wire::{Backlog, ChunkKind, FrameBuilder, room_for_payload};
-use std::ops::Range;
 use std::time::Duration;
-
-/// A chunk of a frame, with the data that the sender needs once its fate is known.
-#[derive(Debug)]
-pub(super) enum Part<C> {
-    Map(C),
-    /// A label and bytes of its name and colour.
-    LabelClass((u8, usize)),
-    /// A version of the tree of labels and bytes of it.
-    LabelTree((u32, usize)),
-    Layer(LayerId, LayerCarried),
-    LayerDigest(LayerId),
-    Object(ObjectId, SymbolRun),
-    Pose,
-    /// A report that tells of these slots.
-    Report(Range<usize>),
-    InForce(SentPart),
-    Caller,
-}
-
-impl<C> Part<C> {
-    pub(super) fn class(&self) -> Class {
-        match self {
-            Self::Map(_) | Self::LabelClass(_) | Self::LabelTree(_) => Class::Map,
-            Self::Layer(id, _) | Self::LayerDigest(id) => Class::Layer(*id),
-            Self::Object(..) => Class::Exemplar,
-            Self::Pose | Self::Report(_) | Self::InForce(_) | Self::Caller => Class::Status,
-        }
-    }
-}
-
-/// The chunks of a frame, each with the bytes of its payload.
-pub(super) type Carried<C> = Vec<(Part<C>, usize)>;
 
 /// The state of the link that a frame reports or depends on.
 pub(super) struct FillContext<'a> {

@@ -1,32 +1,12 @@
 //! Layers of the map and background streams: their chunks in a frame, and the turns that they need.
 
 use super::config::OversizedChunk;
-use super::content::{Carried, Part, VehicleContent};
+use super::content::VehicleContent;
+use super::parts::{Carried, LayerOut, Part};
 use crate::map::{LayerId, LayerMask, LayerSource, StateSource};
 use crate::schedule::{BackgroundStream, BitBudget};
 use crate::time::Instant;
 use crate::wire::{ChunkKind, FrameBuilder, room_for_payload};
-
-/// A layer that the link replicates.
-#[derive(Debug)]
-pub(super) struct LayerOut {
-    pub(super) source: LayerSource,
-    /// Whether its digest is due.
-    pub(super) owes_digest: bool,
-    /// Whether it is sent at all; another one rests with the levels that the surface has of it.
-    pub(super) is_selected: bool,
-}
-
-impl LayerOut {
-    /// A layer without a share is sent with spare capacity only.
-    pub(super) fn has_share(&self) -> bool {
-        self.source.descriptor().share > 0
-    }
-
-    fn is_shared(&self) -> bool {
-        self.is_selected && self.has_share()
-    }
-}
 
 impl<S: StateSource> VehicleContent<S> {
     /// Replicates a layer beside the state; `false` if there is one with its index already.

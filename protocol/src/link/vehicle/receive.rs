@@ -1,7 +1,7 @@
 //! Handling of received frames.
 
-use super::content::Carried;
 use super::hellos::ShortReply;
+use super::parts::Carried;
 use super::{VehicleEvent, VehicleLink};
 use crate::bytes::Truncated;
 use crate::directive::{InForceDigests, Slot, VersionedSlot};

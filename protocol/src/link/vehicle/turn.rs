@@ -1,6 +1,7 @@
 //! When the vehicle transmits, and how a turn ends.
 
-use super::content::{Carried, FillContext, Part};
+use super::content::FillContext;
+use super::parts::{Carried, Part};
 use super::repeat::RepeatTerms;
 use super::{VehicleEvent, VehicleLink};
 use crate::link::handshake::FramePurpose;

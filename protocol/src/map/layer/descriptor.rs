@@ -1,7 +1,6 @@
 //! The description of a layer: all that a reader needs to show its levels.
 
 use super::Decimal;
-use super::set::DEPTH;
 use crate::map::{MAX_LABEL, TextPart, UNEXPLORED};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -146,14 +145,6 @@ impl LayerDescriptor {
     const HEAD: usize = 13;
     /// A quantity has to leave its level by this share of the level's width before it has another one.
     const HYSTERESIS: f64 = 0.2;
-
-    /// Depths in steps of about `step_m` metres, to a tenth, with `middle_m` in the middle of the scale, or as near to it
-    /// as a scale that begins at the surface or below has it.
-    pub fn depth_around(middle_m: f64, step_m: f64) -> Self {
-        let step_dm = (step_m * 10.0).round().clamp(1.0, 255.0);
-        let first = (middle_m * 10.0 / step_dm - f64::from(MAX_LABEL) / 2.0).round().max(0.0);
-        Self { scale: Decimal::new(step_dm as i32, -1), offset: Decimal::new((first * step_dm) as i32, -1), ..DEPTH }
-    }
 
     /// Whether both ends can use it: name, unit, scale, levels and share within their ranges.
     pub fn is_sound(&self) -> bool {

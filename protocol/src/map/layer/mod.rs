@@ -2,10 +2,12 @@
 //! itself, as the labels are.
 
 mod chunk;
+mod decimal;
 mod descriptor;
 mod set;
 
-pub use chunk::{Decimal, LayerChunk};
+pub use chunk::LayerChunk;
+pub use decimal::Decimal;
 pub use descriptor::{LayerDescriptor, Palette, Quantity, Spread, Steps, UpperEnd};
 pub use set::{BUILT_IN_LAYERS, BuiltInLayer, LayerId, LayerMask, LayerSet};
 

@@ -1,6 +1,7 @@
 //! The layers of one map, by index and by name, and those that every vehicle and surface know.
 
 use super::{Decimal, LayerDescriptor, Palette, Quantity, Spread, Steps, UpperEnd};
+use crate::map::MAX_LABEL;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -134,6 +135,16 @@ pub(super) const DEPTH: LayerDescriptor = LayerDescriptor {
     palette: Palette::Cividis,
     spread: Spread::Present,
 };
+
+impl LayerDescriptor {
+    /// Depths in steps of about `step_m` metres, to a tenth, with `middle_m` in the middle of the scale, or as near to it
+    /// as a scale that begins at the surface or below has it.
+    pub fn depth_around(middle_m: f64, step_m: f64) -> Self {
+        let step_dm = (step_m * 10.0).round().clamp(1.0, 255.0);
+        let first = (middle_m * 10.0 / step_dm - f64::from(MAX_LABEL) / 2.0).round().max(0.0);
+        Self { scale: Decimal::new(step_dm as i32, -1), offset: Decimal::new((first * step_dm) as i32, -1), ..DEPTH }
+    }
+}
 
 /// How sure the model is of the label, from 0 to 1.
 pub(super) const CONFIDENCE: LayerDescriptor = LayerDescriptor {
