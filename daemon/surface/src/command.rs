@@ -59,6 +59,21 @@ pub enum CommandAction {
     Keep,
 }
 
+impl CommandAction {
+    /// What is asked, for the log.
+    pub fn told(&self) -> String {
+        match self {
+            Self::Request => "request for command".to_owned(),
+            Self::Withdraw => "end of a request for command".to_owned(),
+            Self::Take => "taking of command".to_owned(),
+            Self::HandOver(Some(to)) => format!("hand-over of command to {to}"),
+            Self::HandOver(None) => "hand-over of command".to_owned(),
+            Self::Release => "release of command".to_owned(),
+            Self::Keep => "sign of presence".to_owned(),
+        }
+    }
+}
+
 /// The reason why an action is refused, as one line for people.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CommandRefusal {

@@ -179,3 +179,25 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_refused_request_for_command_is_in_the_log() {
+    use crate::{ClientRequest, LogKind, Reply, SurfaceRequest, handle_request};
+    let config = scenecast_config::load(None, &[]).unwrap();
+    let modem = scenecast_config::modem_profile(&config, 10_000.0);
+    let table = scenecast_core::tuning_table::TuningTable::shipped();
+    let mut surface = crate::assemble(&config, None, table, modem, 1, at(0)).unwrap();
+    surface.set_principals(principals().to_vec());
+    let [_, anna, bob, _] = crew();
+    let mut ask = |by: Giver, action: CommandAction| {
+        let request = ClientRequest { by: Some(by), request: SurfaceRequest::Command(action) };
+        handle_request(&mut surface, request, 0.5, at(1))
+    };
+    assert!(matches!(ask(anna, CommandAction::Take), Reply::Command(_)));
+    assert!(matches!(ask(bob.clone(), CommandAction::Take), Reply::NotInCommand(_)));
+    assert!(matches!(ask(bob, CommandAction::Keep), Reply::Command(_)), "a sign of presence asks for nothing");
+    let refused: Vec<_> = surface.log().entries().filter(|entry| entry.kind == LogKind::Refused).collect();
+    let told = "taking of command: refused: anna has command for 0 s";
+    assert!(refused.len() == 1 && refused[0].by.as_deref() == Some("bob"), "{refused:?}");
+    assert!(refused[0].text.starts_with(told), "{}", refused[0].text);
+}

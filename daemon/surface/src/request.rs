@@ -176,7 +176,12 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
     if let SurfaceRequest::Command(action) = &request {
         return match surface.change_command(&by, action, now) {
             Ok(()) => Reply::Command(command_state(surface.command(), now)),
-            Err(refusal) => refused::refused(&refusal),
+            Err(refusal) => {
+                if !matches!(action, CommandAction::Keep) {
+                    refused::log(surface, None, by.name(), &format!("{}: refused: {refusal}", action.told()), now);
+                }
+                refused::refused(&refusal)
+            }
         };
     }
     if let SurfaceRequest::Barred(vehicle, what) = &request {

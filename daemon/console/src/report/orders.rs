@@ -31,8 +31,10 @@ fn after(dive: &Dive, given_s: f64, at_s: f64) -> String {
 impl DiveVehicle {
     /// Notes a status that the surface recorded.
     pub(super) fn take_order(&mut self, message: &OrderStatus) {
-        let step = OrderStep::of(message);
+        let mut step = OrderStep::of(message);
         let way = self.orders.entry((message.slot.clone(), message.version)).or_default();
+        // The first status was written when the order was given; later ones work that moment out from the mission's time.
+        step.given_s = way.first().map_or(step.given_s, |first| first.given_s);
         // The next file of a record repeats the last status.
         if way.last().is_none_or(|last| last.status != step.status) {
             way.push(step);
@@ -287,6 +289,16 @@ mod tests {
         let mut message = OrderStatus { slot: "fence".into(), version, status, ..OrderStatus::default() };
         (message.header.stamp, message.given) = (Time::from_nanos(s * 1_000_000_000), Time::from_nanos(1_000_000_000));
         message
+    }
+
+    #[test]
+    fn an_order_was_given_when_its_first_status_says() {
+        let mut vehicle = DiveVehicle::default();
+        vehicle.take_order(&status(1, OrderStatus::QUEUED, 1));
+        let later = OrderStatus { given: Time::from_nanos(3_000_000_000), ..status(1, OrderStatus::APPLIED, 4) };
+        vehicle.take_order(&later);
+        let last = vehicle.orders[&("fence".to_owned(), 1)].last().unwrap();
+        assert_eq!((last.given_s, last.at_s), (1.0, 4.0));
     }
 
     #[test]
