@@ -20,6 +20,7 @@ use scenecast_files::{Recording, configured_recording, read_class_names};
 use scenecast_host::{CameraPose, VehicleHost, VehicleHostEvent, modem_station};
 use scenecast_labels::ImagePose;
 use scenecast_protocol::directive::{SlotId, SlotState};
+use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::time::Instant;
@@ -44,13 +45,13 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
 /// The vehicle's role at the start of a run, with the state that was restored.
 fn vehicle_of(
     config: &Config,
+    authenticity: Option<Authenticity>,
     restored: StartedRun<Folder>,
     modem: ModemProfile,
     recording: Option<&Recording>,
     now: Instant,
 ) -> Result<(Vehicle, Keeper<Folder>), UserError> {
     let StartedRun { keeper, durable, is_again, is_stored } = restored;
-    let authenticity = scenecast_config::authenticity(config, scenecast_config::vehicle_address(config)?)?;
     let area = survey_area(config, recording)?;
     let seed = super::random_bits();
     let mut vehicle = scenecast_vehicle::assemble(config, authenticity, modem, area, durable, seed, now)?;
@@ -133,12 +134,14 @@ impl VehicleShell {
         simulated: Option<SimulatedAutopilot>,
     ) -> Result<(Self, Stop), UserError> {
         let address = scenecast_config::vehicle_address(config)?;
+        // A wrong key ends the start before the folder of the state is touched.
+        let authenticity = scenecast_config::authenticity(config, address)?;
         let dir = config.runtime.state_dir.as_path();
         let Start { run, mapper, keep, labels } = start(config, dir)?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = scenecast_drivers::modem::modem_of_process(config, address)?;
         let recording = configured_recording(config)?;
-        let (vehicle, keeper) = vehicle_of(config, run, profile, recording.as_ref(), clock.now())?;
+        let (vehicle, keeper) = vehicle_of(config, authenticity, run, profile, recording.as_ref(), clock.now())?;
         // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
         let stop = Stop::new()?;
         let (is_recorded, sensors) = (recording.is_some(), RosSensors::new(config)?);

@@ -99,7 +99,7 @@ fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) ->
 /// The limits that an order names, those that it removes last.
 fn limits_named(order: &OrderChanges<LimitsOrder>) -> String {
     let removed: Vec<String> =
-        order.named().iter().filter(|(_, v)| v.is_null()).map(|(name, _)| name.replace('_', " ")).collect();
+        order.named().iter().filter(|(_, v)| v.is_null()).map(|(name, _)| words_and_unit(name).0).collect();
     let stated = Some(members(order.named())).filter(|_| removed.len() < order.named().len());
     let removed = (!removed.is_empty()).then(|| format!("removed: {}", removed.join(", ")));
     stated.into_iter().chain(removed).collect::<Vec<_>>().join("; ")
@@ -109,8 +109,37 @@ fn limits_named(order: &OrderChanges<LimitsOrder>) -> String {
 fn members(order: &impl serde::Serialize) -> String {
     let value = serde_json::to_value(order).unwrap_or_default();
     let stated = value.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
-    let stated: Vec<String> = stated.map(|(name, value)| format!("{} {value}", name.replace('_', " "))).collect();
-    if stated.is_empty() { "none".to_owned() } else { stated.join(", ").replace('"', "") }
+    let stated: Vec<String> = stated.map(|(name, value)| member(name, value)).collect();
+    if stated.is_empty() { "none".to_owned() } else { stated.join(", ") }
+}
+
+/// A member in words: "depth 2 to 25 m".
+fn member(name: &str, value: &Value) -> String {
+    let (name, unit) = words_and_unit(name);
+    let value = match value.as_array().map(Vec::as_slice) {
+        Some([low, high]) if unit.is_some() => match (low.is_null(), high.is_null()) {
+            (false, false) => format!("{} to {}", plain(low), plain(high)),
+            (true, _) => format!("at most {}", plain(high)),
+            (_, true) => format!("at least {}", plain(low)),
+        },
+        _ => plain(value),
+    };
+    [Some(name), Some(value), unit.map(str::to_owned)].into_iter().flatten().collect::<Vec<_>>().join(" ")
+}
+
+/// The words of a member's name, and the unit that ends it.
+fn words_and_unit(name: &str) -> (String, Option<&'static str>) {
+    let unit = ["m", "s"].into_iter().find(|unit| name.ends_with(&format!("_{unit}")) && !name.ends_with("_per_s"));
+    let words = unit.map_or(name, |unit| name.trim_end_matches(unit)).trim_end_matches('_');
+    (words.replace('_', " "), unit)
+}
+
+/// A value without quotation marks, and a whole number without decimals.
+fn plain(value: &Value) -> String {
+    match value.as_f64() {
+        Some(number) => number.to_string(),
+        None => value.to_string().replace('"', ""),
+    }
 }
 
 #[cfg(test)]
@@ -127,15 +156,17 @@ mod tests {
         let weights = SurfaceRequest::Utility(1, [(3, 0.8), (4, 0.0)].into(), (0.1, 0.0));
         assert_eq!(text(weights), Some(("order", "weights: label 3 +0.80, unexplored +0.10".into())));
         let limits = LimitsOrder { time_s: Some(600.0), on_silence: Some("hold".into()), ..LimitsOrder::default() };
-        let whole = "limits: on silence hold, time s 600.0; \
-                     removed: altitude m, depth m, distance m, on abort, on breach, silence s";
+        let whole = "limits: on silence hold, time 600 s; \
+                     removed: altitude, depth, distance, on abort, on breach, silence";
         assert_eq!(text(SurfaceRequest::Limits(1, OrderChanges::whole(&limits))), Some(("order", whole.into())));
         let changes = serde_json::from_str(r#"{"depth_m": null, "time_s": 60}"#).unwrap();
+        let depth = serde_json::from_str(r#"{"depth_m": [2, 25.5]}"#).unwrap();
+        assert_eq!(text(SurfaceRequest::Limits(1, depth)), Some(("order", "limits: depth 2 to 25.5 m".into())));
         let removed = serde_json::from_str(r#"{"silence_s": null}"#).unwrap();
-        assert_eq!(text(SurfaceRequest::Limits(1, removed)), Some(("order", "limits: removed: silence s".into())));
+        assert_eq!(text(SurfaceRequest::Limits(1, removed)), Some(("order", "limits: removed: silence".into())));
         assert_eq!(
             text(SurfaceRequest::Limits(1, changes)),
-            Some(("order", "limits: time s 60; removed: depth m".into()))
+            Some(("order", "limits: time 60 s; removed: depth".into()))
         );
         let to = DestinationOrder { place: Some([1.0, -2.5]) };
         assert_eq!(text(SurfaceRequest::Destination(1, to)), Some(("order", "destination: E 1.0 N -2.5 m".into())));
