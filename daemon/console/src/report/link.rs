@@ -3,12 +3,13 @@
 use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
+use super::gaps;
+use super::round_trip::by_round_trip;
 use super::words::{self, counted};
 use crate::recording::FrameCounts;
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Link;
 use scenecast_surface::state::{LinkDirection, LinkSummary, VehicleState};
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 impl Dive {
@@ -36,38 +37,50 @@ impl Dive {
     /// The link and the position over time, the link over range, and what its bytes were.
     pub(super) fn link(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         let (begin, end) = self.span_s;
-        let series = |name, unit, value: fn(&Link) -> f32| Series {
+        // While nothing arrives, what the surface had last says nothing of the link.
+        let silences = gaps::silences(self, vehicle);
+        let is_silent = |at_s: f64| silences.iter().any(|gap| (gap.0..gap.1).contains(&at_s));
+        let of_link = |name, unit: &str, value: &dyn Fn(f64, &Link) -> f64| Series {
             name,
-            unit,
-            points: vehicle.link.iter().map(|(at_s, link)| (at_s - begin, f64::from(value(link)))).collect(),
+            unit: unit.to_owned(),
+            points: vehicle.link.iter().map(|(at_s, link)| (at_s - begin, value(*at_s, link))).collect(),
         };
-        let uncertainty = Series {
-            name: "uncertainty of the place on the earth (68 %, east and north each)",
-            unit: "m",
-            points: vehicle.track.iter().map(|point| (point.at_s - begin, point.sigma_m)).collect(),
+        let known = |at_s: f64, value: f32| if is_silent(at_s) { f64::NAN } else { f64::from(value) };
+        let (a_second, s) = match self.is_scaled() {
+            true => ("bit per second of the mission", "s of the clock"),
+            false => ("bit/s", "s"),
         };
         let charts = [
-            series("received from the vehicle", "bit/s", |link| link.received_bps),
-            series("sent to the vehicle", "bit/s", |link| link.sent_bps),
-            series("share of the last 64 frames lost", "%", |link| link.loss * 100.0),
-            series("data that waited at the vehicle", "bit", |link| link.backlog_bits as f32),
-            series("age of the last frame from the vehicle", "s", |link| link.age_s),
+            of_link("received from the vehicle", a_second, &|_, link| f64::from(link.received_bps)),
+            of_link("sent to the vehicle", a_second, &|_, link| f64::from(link.sent_bps)),
+            of_link("share of the last 64 frames lost", "%", &|at_s, link| known(at_s, link.loss * 100.0)),
+            of_link("data that waited at the vehicle, as it reported last", "bit", &|at_s, link| {
+                known(at_s, link.backlog_bits as f32)
+            }),
+            of_link("age of the last frame from the vehicle", s, &|_, link| {
+                f64::from(link.age_s) / self.state.mission.speed
+            }),
             Series {
                 name: "share of the cells that the vehicle had to send that the operator's map had with the same label",
-                unit: "%",
+                unit: "%".to_owned(),
                 points: vehicle.maps.iter().map(|maps| (maps.at_s - begin, maps.agreement * 100.0)).collect(),
             },
-            uncertainty,
+            Series {
+                name: "uncertainty of the place on the earth (68 %, east and north each)",
+                unit: "m".to_owned(),
+                points: vehicle.path().iter().map(|point| (point.at_s - begin, point.sigma_m)).collect(),
+            },
         ];
         let charts: Vec<String> = charts.iter().filter_map(|series| chart::line(series, begin, end - begin)).collect();
         if !charts.is_empty() {
-            let _ = writeln!(page, "<h3>Link and position over time</h3>\n<figure>{}</figure>", charts.join("\n"));
+            let _ = writeln!(
+                page,
+                "<h3>Link and position over time</h3>\n<figure>{}<figcaption>A line has a gap where a value was not known, or came far later than \
+                 usual.</figcaption></figure>",
+                charts.join("\n")
+            );
         }
-        if vehicle.has_modem(self) {
-            *page += &over_range(vehicle);
-        } else {
-            *page += "<p>The frames did not go through a modem, so their round trips tell no distance.</p>\n";
-        }
+        *page += &by_round_trip(self, vehicle);
         self.frames_and_bytes(page, state, vehicle);
     }
 
@@ -255,41 +268,6 @@ fn told_budgets(budgets: &[(f64, u32)]) -> Option<String> {
 /// The cells of a layer of the maps at the end.
 fn sum_of_layer(dive: &Dive, layer: &str) -> usize {
     dive.vehicles().map(|(_, vehicle)| vehicle.layer_cells.get(layer).copied().unwrap_or_default()).sum()
-}
-
-/// The quality of the link by the distance of the vehicle, which the round trips tell; empty where they are not known.
-fn over_range(vehicle: &DiveVehicle) -> String {
-    const SOUND_M_S: f64 = 1500.0;
-    let known = vehicle.link.iter().filter(|(_, link)| link.round_trip_s > 0.0);
-    let known: Vec<(f64, &Link)> =
-        known.map(|(_, link)| (f64::from(link.round_trip_s) / 2.0 * SOUND_M_S, link)).collect();
-    let Some(farthest_m) = known.iter().map(|(range_m, _)| *range_m).reduce(f64::max) else {
-        return "<p>No round trip was measured, so the distance of the vehicle is not known.</p>\n".to_owned();
-    };
-    let step_m = chart::round_length(farthest_m / 4.0).max(10.0);
-    let mut bins: BTreeMap<u64, Vec<&Link>> = BTreeMap::new();
-    known.into_iter().for_each(|(range_m, link)| bins.entry((range_m / step_m) as u64).or_default().push(link));
-    let mut table = "<h3>Link over range</h3>\n<table><tr><th>half of the round trip</th><th>moments</th><th>frames lost</th><th>received from it</th></tr>".to_owned();
-    for (bin, links) in bins {
-        let mean = |value: fn(&Link) -> f32| {
-            let values: Vec<f64> =
-                links.iter().map(|link| f64::from(value(link))).filter(|value| value.is_finite()).collect();
-            values.iter().sum::<f64>() / values.len().max(1) as f64
-        };
-        let _ = write!(
-            table,
-            "<tr><td>{:.0} to {:.0} m</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{:.0} bit/s</td></tr>",
-            bin as f64 * step_m,
-            (bin + 1) as f64 * step_m,
-            links.len(),
-            mean(|link| link.loss) * 100.0,
-            mean(|link| link.received_bps)
-        );
-    }
-    table
-        + "</table>\n<p>Each moment is one of every ten seconds. Half of the round trip is told as a distance at 1500 m/s; the vehicle was nearer than that, \
-             as the time that modems and serial lines take is in it. The share lost is that of the last 64 frames, or of all so far while there \
-             are fewer.</p>\n"
 }
 
 #[cfg(test)]

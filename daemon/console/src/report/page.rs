@@ -4,7 +4,7 @@ use super::areas::ClassArea;
 use super::chart;
 use super::dive::{Dive, DiveVehicle};
 use super::orders::said;
-use super::{Escaped, doubts, extent, summary, words};
+use super::{Escaped, doubts, extent, map_figure, summary, words};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use scenecast_core::utc_text;
@@ -108,7 +108,7 @@ impl Dive {
             let _ = writeln!(page, "<h3>{title}</h3>\n<ul>\n{items}</ul>");
         }
         let area = extent::of_survey(self, vehicle);
-        if let Some(map) = chart::map(state, vehicle, area) {
+        if let Some(map) = map_figure::map(state, vehicle, area) {
             let _ = writeln!(
                 page,
                 "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The operator's map at the end, each class with its number, and the \

@@ -4,7 +4,7 @@ use super::dive::{Dive, DiveVehicle};
 use super::maps::MapsAt;
 use super::order_step::OrderStep;
 use super::words::{self, area, counted, interval, on_earth};
-use super::{extent, gaps, trouble};
+use super::{extent, gaps, trouble, uncertainty};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::directive::{PlannerKind, SlotId};
@@ -42,6 +42,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     let mut sent = vec![orders(dive, state, vehicle)];
     sent.extend(dive.link_sentences(vehicle));
     sent.extend(gaps::heard(dive, vehicle));
+    sent.extend(trouble::modes(dive, state, vehicle));
     vec![
         ("Where and when", made_up.into_iter().chain(dates).chain(way).collect()),
         ("What was found", map.into_iter().flatten().collect()),
@@ -256,7 +257,7 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         words::north(last.north_m),
         on_earth(dive, (last.east_m, last.north_m)),
         moved(state, vehicle),
-        uncertainty(vehicle)
+        uncertainty::told(vehicle)
     )
 }
 
@@ -292,30 +293,6 @@ fn moved(state: &VehicleState, vehicle: &DiveVehicle) -> String {
             words::north(north_m).replace("north", "to the north").replace("south", "to the south")
         ),
     }
-}
-
-/// What the uncertainty of a place is.
-const WITHIN: &str =
-    "the uncertainty of its place on the earth (east and north each are within it with a probability of 68 %) was";
-
-/// The uncertainty of its place over the record.
-fn uncertainty(vehicle: &DiveVehicle) -> String {
-    let sigmas = vehicle.path().iter().map(|point| point.sigma_m).filter(|sigma_m| sigma_m.is_finite());
-    let sigmas: Vec<f64> = sigmas.collect();
-    let (Some(median_m), Some(last_m)) = (words::median(&sigmas), sigmas.last()) else { return String::new() };
-    let most_m = sigmas.iter().copied().fold(0.0, f64::max);
-    if !vehicle.measures_sigma() {
-        return format!(
-            " The uncertainty of its place on the earth was not measured: it stayed at {last_m:.2} m, as it began."
-        );
-    }
-    if format!("{median_m:.2} {last_m:.2}") == format!("{most_m:.2} {most_m:.2}") {
-        return format!(" By its own estimate, {WITHIN} {last_m:.2} m.");
-    }
-    let checked = if vehicle.has_fixes() { "" } else { ", which nothing has checked" };
-    format!(
-        " By its own estimate{checked}, {WITHIN} {median_m:.1} m or less half of the time, {most_m:.1} m at most, and {last_m:.1} m at the end."
-    )
 }
 
 fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> String {
