@@ -7,6 +7,7 @@ mod dive;
 mod doubts;
 mod extent;
 mod gaps;
+mod images;
 mod link;
 mod log;
 mod map_figure;

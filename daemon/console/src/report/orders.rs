@@ -79,6 +79,20 @@ impl DiveVehicle {
         content.get("labels")?.as_array().map(|labels| labels.iter().filter_map(Value::as_u64).collect())
     }
 
+    /// When images of a label were newly asked for, and from when on the vehicle may have sent one because of that.
+    pub(super) fn asked_s(&self, label: u8) -> Vec<(f64, f64)> {
+        let mut asked_s = Vec::new();
+        let mut was_asked = false;
+        for (order, given) in self.given.iter().filter(|((slot, _), _)| slot == SlotId::Requests.name()) {
+            let is_asked = self.labels_of_images(order).is_some_and(|labels| labels.contains(&label.into()));
+            let given_s = unix_s(&given.header.stamp);
+            let known_s = self.own.decided_s.get(order).copied().unwrap_or(given_s);
+            asked_s.extend((is_asked && !was_asked).then_some((given_s, known_s)));
+            was_asked = is_asked;
+        }
+        asked_s
+    }
+
     /// What such an order says, in words.
     fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
         let given = self.given.get(order)?;
@@ -116,6 +130,18 @@ impl Dive {
         });
         let nearest = logged.filter(|(away_s, ..)| *away_s < 0.5).min_by(|a, b| a.0.total_cmp(&b.0));
         let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
+        let larger = self.events.iter().any(|(at_s, event)| {
+            let is_it = |words: &str| words.starts_with("larger image requested: ");
+            event.source == "order"
+                && (at_s - given_s).abs() < 0.5
+                && event.vehicle == state.name
+                && said(&event.text, is_it).is_some()
+        });
+        let is_of_images = given.slot == SlotId::Requests.name();
+        let content = match is_of_images && larger {
+            true => content.replacen("images of", "a larger image of", 1),
+            false => content,
+        };
         // The log has places in a few words.
         let words = if content.len() > MAX_CONTENT { words } else { content };
         let by = match (given.principal.is_empty(), by.is_empty()) {
@@ -131,7 +157,7 @@ impl Dive {
         if vehicle.orders_of_people().next().is_none() {
             return;
         }
-        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>decided on board after</th><th>known at the surface after</th></tr></thead>\n";
+        *page += "<h3>Orders</h3>\n<table class=\"wide\"><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>decided on board after</th><th>known at the surface after</th></tr></thead>\n";
         let mut orders: Vec<(&OrderKey, &OrderStep)> =
             vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.last()?))).collect();
         orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
@@ -144,7 +170,7 @@ impl Dive {
             let end = end.map_or_else(|| last.told(), |by| format!("{}; {by}", last.told()));
             let _ = writeln!(
                 page,
-                "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{on_board}</td><td class=\"n\">{known}</td></tr>",
+                "<tr><td>{}</td><td class=\"o\">{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td>{on_board}</td><td>{known}</td></tr>",
                 Escaped(words::order(slot, &ordered)),
                 Escaped(&ordered),
                 Escaped(&by),
@@ -179,6 +205,9 @@ impl Dive {
                 let (by, mut ordered) = self.ordered(state, vehicle, order);
                 let given = utc_text(step.given_s);
                 let kind = Escaped(words::order(slot, &ordered)).to_string();
+                if slot == SlotId::Utility.name() {
+                    ordered += &inherited(state, vehicle, order);
+                }
                 if is_aborted && slot == SlotId::Destination.name() {
                     ordered += "; the abort ended it";
                 }
@@ -268,6 +297,21 @@ impl Dive {
             );
         }
         *page += "</table>\n";
+    }
+}
+
+/// The weights that labels took over from those of an order; empty where they are not known, as after a later order.
+fn inherited(state: &VehicleState, vehicle: &DiveVehicle, order: &OrderKey) -> String {
+    let is_last = vehicle.orders.keys().filter(|(slot, _)| *slot == order.0).max() == Some(order);
+    let content = vehicle.given.get(order).and_then(|given| serde_json::from_str::<Value>(&given.content).ok());
+    let Some(content) = content.filter(|_| is_last) else { return String::new() };
+    let is_named = |label: u8| content["weights"].get(label.to_string()).is_some();
+    let others = state.labels.iter().filter(|label| label.weight != 0.0 && !is_named(label.id));
+    let others: Vec<String> =
+        others.map(|label| format!("{}: {:.2}", words::label(&state.label_book, label.id), label.weight)).collect();
+    match others.is_empty() {
+        true => String::new(),
+        false => format!("; labels that came later took over weights of these: {}", others.join(", ")),
     }
 }
 
