@@ -8,6 +8,7 @@ mod doubts;
 mod extent;
 mod gaps;
 mod images;
+mod in_force;
 mod link;
 mod log;
 mod map_figure;

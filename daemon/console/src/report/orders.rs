@@ -4,11 +4,10 @@ use super::dive::{Dive, DiveVehicle};
 use super::order_step::{OrderKey, OrderStep};
 use super::{Escaped, unix_s, words};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::OrderStatus;
+use scenecast_messages::scenecast_msgs::{Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::state::{InForceKnowledge, VehicleState};
+use scenecast_surface::state::VehicleState;
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The longest content of an order that is told whole, bytes.
@@ -74,27 +73,13 @@ impl DiveVehicle {
     }
 
     /// The labels of which an order asks for images.
-    fn labels_of_images(&self, order: &OrderKey) -> Option<Vec<u64>> {
+    pub(super) fn labels_of_images(&self, order: &OrderKey) -> Option<Vec<u64>> {
         let content: Value = serde_json::from_str(&self.given.get(order)?.content).ok()?;
         content.get("labels")?.as_array().map(|labels| labels.iter().filter_map(Value::as_u64).collect())
     }
 
-    /// When images of a label were newly asked for, and from when on the vehicle may have sent one because of that.
-    pub(super) fn asked_s(&self, label: u8) -> Vec<(f64, f64)> {
-        let mut asked_s = Vec::new();
-        let mut was_asked = false;
-        for (order, given) in self.given.iter().filter(|((slot, _), _)| slot == SlotId::Requests.name()) {
-            let is_asked = self.labels_of_images(order).is_some_and(|labels| labels.contains(&label.into()));
-            let given_s = unix_s(&given.header.stamp);
-            let known_s = self.own.decided_s.get(order).copied().unwrap_or(given_s);
-            asked_s.extend((is_asked && !was_asked).then_some((given_s, known_s)));
-            was_asked = is_asked;
-        }
-        asked_s
-    }
-
     /// What such an order says, in words.
-    fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
+    pub(super) fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
         let given = self.given.get(order)?;
         let labels = |version: &u32| self.labels_of_images(&(slot.clone(), *version));
         // An order of images has all that are awaited.
@@ -130,15 +115,7 @@ impl Dive {
         });
         let nearest = logged.filter(|(away_s, ..)| *away_s < 0.5).min_by(|a, b| a.0.total_cmp(&b.0));
         let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
-        let larger = self.events.iter().any(|(at_s, event)| {
-            let is_it = |words: &str| words.starts_with("larger image requested: ");
-            event.source == "order"
-                && (at_s - given_s).abs() < 0.5
-                && event.vehicle == state.name
-                && said(&event.text, is_it).is_some()
-        });
-        let is_of_images = given.slot == SlotId::Requests.name();
-        let content = match is_of_images && larger {
+        let content = match self.is_of_larger(state, given) {
             true => content.replacen("images of", "a larger image of", 1),
             false => content,
         };
@@ -150,6 +127,15 @@ impl Dive {
             (true, _) => by,
         };
         (words::author(&by).to_owned(), words)
+    }
+
+    /// Whether an order asks for a larger version of an image, which the log alone says.
+    pub(super) fn is_of_larger(&self, state: &VehicleState, given: &Order) -> bool {
+        let is_it = |words: &str| words.starts_with("larger image requested: ");
+        let is_near = |at_s: f64| (at_s - unix_s(&given.header.stamp)).abs() < 0.5;
+        let of_it = self.events.iter().filter(|(at_s, event)| is_near(*at_s) && event.vehicle == state.name);
+        given.slot == SlotId::Requests.name()
+            && of_it.into_iter().any(|(_, event)| event.source == "order" && said(&event.text, is_it).is_some())
     }
 
     /// The orders with their ends, the first one first.
@@ -179,82 +165,6 @@ impl Dive {
             );
         }
         *page += "</table>\n";
-    }
-
-    /// The orders that were in force at the end, beside what was configured.
-    pub(super) fn in_force(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-        let passing = [SlotId::Requests.name(), SlotId::Fix.name()];
-        let mut last: BTreeMap<&str, (&OrderKey, &OrderStep)> = BTreeMap::new();
-        for (order, way) in vehicle.orders_of_people().filter(|((slot, _), _)| !passing.contains(&slot.as_str())) {
-            if let Some(applied) = way.iter().rev().find(|step| step.status == OrderStatus::APPLIED) {
-                last.insert(order.0.as_str(), (order, applied));
-            }
-        }
-        let is_aborted = last
-            .get(SlotId::Constraints.name())
-            .is_some_and(|(order, _)| vehicle.content(state, order).is_some_and(|content| content == "abort"));
-        last.retain(|slot, (order, _)| {
-            let is_over = state.orders.in_force.get(*slot) == Some(&InForceKnowledge::None);
-            !is_over && vehicle.content(state, order).is_none_or(|content| content != "resume")
-        });
-        let mut last: Vec<_> = last.into_iter().collect();
-        last.sort_by(|a, b| a.1.1.given_s.total_cmp(&b.1.1.given_s));
-        let rows: String = last
-            .into_iter()
-            .map(|(slot, (order, step))| {
-                let (by, mut ordered) = self.ordered(state, vehicle, order);
-                let given = utc_text(step.given_s);
-                let kind = Escaped(words::order(slot, &ordered)).to_string();
-                if slot == SlotId::Utility.name() {
-                    ordered += &inherited(state, vehicle, order);
-                }
-                if is_aborted && slot == SlotId::Destination.name() {
-                    ordered += "; the abort ended it";
-                }
-                let (ordered, by) = (Escaped(&ordered).to_string(), Escaped(&by).to_string());
-                format!("<tr><td>{kind}</td><td>{ordered}</td><td class=\"t\">{given}</td><td>{by}</td></tr>\n")
-            })
-            .collect();
-        let budget = state.status.as_ref().map_or_else(String::new, |status| {
-            format!(
-                " The vehicle kept to a budget of {} bit/s then, the surface to {}.",
-                status.budget_bps, self.state.link.budget_bps
-            )
-        });
-        *page += "<h3>In force at the end</h3>\n";
-        *page += &match rows.is_empty() {
-            true => format!("<p>No order was in force: all was as configured.{budget}</p>\n"),
-            false => format!(
-                "<p>The last order of each kind that the vehicle applied; all else was as configured.{budget}</p>\n<table><thead><tr><th>kind</th>\
-                 <th>what was ordered</th><th>given (UTC)</th><th>by</th></tr></thead>\n{rows}</table>\n"
-            ),
-        };
-        *page += &self.awaited_images(state, vehicle);
-    }
-
-    /// The images that the last order of them asked for and that have not arrived, in a paragraph.
-    fn awaited_images(&self, state: &VehicleState, vehicle: &DiveVehicle) -> String {
-        let slot = SlotId::Requests.name();
-        let last = vehicle
-            .orders_of_people()
-            .filter(|((of, _), _)| of == slot)
-            .filter_map(|(order, way)| Some((order, way.last()?)));
-        let Some((order, last)) = last.max_by_key(|((_, version), _)| *version) else { return String::new() };
-        let has_come =
-            |label: &u8| vehicle.exemplars.iter().any(|(at_s, image)| image.label == *label && *at_s >= last.given_s);
-        let awaited: Vec<String> = (vehicle.labels_of_images(order).into_iter().flatten())
-            .filter_map(|label| u8::try_from(label).ok())
-            .filter(|label| !has_come(label))
-            .map(|label| words::label(&state.label_book, label))
-            .collect();
-        if awaited.is_empty() || last.status == OrderStatus::REFUSED || last.status == OrderStatus::WITHDRAWN {
-            return String::new();
-        }
-        format!(
-            "<p>Asked for at {} and not arrived since: images of {}.</p>\n",
-            utc_text(last.given_s),
-            Escaped(&awaited.join(", "))
-        )
     }
 
     /// What the vehicle was steered by over time, and its modes.
@@ -300,21 +210,6 @@ impl Dive {
     }
 }
 
-/// The weights that labels took over from those of an order; empty where they are not known, as after a later order.
-fn inherited(state: &VehicleState, vehicle: &DiveVehicle, order: &OrderKey) -> String {
-    let is_last = vehicle.orders.keys().filter(|(slot, _)| *slot == order.0).max() == Some(order);
-    let content = vehicle.given.get(order).and_then(|given| serde_json::from_str::<Value>(&given.content).ok());
-    let Some(content) = content.filter(|_| is_last) else { return String::new() };
-    let is_named = |label: u8| content["weights"].get(label.to_string()).is_some();
-    let others = state.labels.iter().filter(|label| label.weight != 0.0 && !is_named(label.id));
-    let others: Vec<String> =
-        others.map(|label| format!("{}: {:.2}", words::label(&state.label_book, label.id), label.weight)).collect();
-    match others.is_empty() {
-        true => String::new(),
-        false => format!("; labels that came later took over weights of these: {}", others.join(", ")),
-    }
-}
-
 /// The author and the words of an entry of the log, of which the words are to be recognised.
 pub(super) fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, String)> {
     let (by, words) = text.split_once(": ").filter(|(_, words)| is_it(words)).unwrap_or(("", text));
@@ -325,7 +220,7 @@ pub(super) fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, 
 mod tests {
     use super::*;
     use scenecast_messages::builtin_interfaces::Time;
-    use scenecast_messages::scenecast_msgs::{Event, Order};
+    use scenecast_messages::scenecast_msgs::Event;
 
     fn status(version: u32, status: u8, s: i64) -> OrderStatus {
         let mut message = OrderStatus { slot: "fence".into(), version, status, ..OrderStatus::default() };
