@@ -25,9 +25,7 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
             utc_text(*stopped_s)
         )
     }));
-    sentences.extend(
-        vehicle.made_up(dive).map(|what| format!("Positions or images are not those of a real dive: this was {what}.")),
-    );
+    sentences.extend(not_real(dive, vehicle));
     sentences.extend(place(dive, state, vehicle));
     sentences.extend(relabelled(dive, state));
     sentences.extend(images(state, vehicle));
@@ -50,6 +48,19 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
         );
     }
     sentences
+}
+
+/// What of the dive was made up.
+fn not_real(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
+    vehicle.made_up(dive)?;
+    let what = if dive.settings.is_rehearsal() {
+        "The sea floor, the images, the motion, the losses and the range of the link, and the energy are made up by the rehearsal."
+    } else if vehicle.is_played_back() {
+        "The images and the poses are those of a recording, which nobody steered; what the link lost is real only if the modems were."
+    } else {
+        "The motion of the vehicle was simulated; what the link lost is real only if the modems were."
+    };
+    Some(what.to_owned())
 }
 
 /// The last time at which much of the map got other labels.

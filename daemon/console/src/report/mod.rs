@@ -26,6 +26,7 @@ mod track;
 mod track_point;
 mod trouble;
 mod uncertainty;
+mod way;
 mod words;
 
 pub use dive::Dive;

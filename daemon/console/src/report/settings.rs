@@ -61,7 +61,11 @@ fn told(key: &str, value: &Value) -> Option<Value> {
     match kind {
         _ if is_port => None,
         "" => (!text.contains(['/', '\\'])).then(|| value.clone()),
-        // As in "frames:FOLDER".
+        // As in "frames:FOLDER": what was played back is told by its last name.
+        "frames" | "bag" | "tum" if key == "camera.source" => {
+            let name = rest.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
+            Some(format!("{kind}:.../{name}").into())
+        }
         kind => Some(format!("{kind}:...").into()),
     }
 }
@@ -80,7 +84,7 @@ mod tests {
         let record: SettingsRecord = serde_json::from_value(settings).unwrap();
         let told: Vec<String> = record.told().iter().map(|(key, value)| format!("{key} {value}")).collect();
         let expected =
-            ["camera.source \"frames:...\"", "link.budget_bps 4000", "modem.kind \"udp\"", "vehicle.name \"a/b: c\""];
+            ["camera.source \"frames:.../C\"", "link.budget_bps 4000", "modem.kind \"udp\"", "vehicle.name \"a/b: c\""];
         assert_eq!(told, expected);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::dive::SetBack;
 use super::dive::{Dive, DiveVehicle};
-use super::{gaps, words};
+use super::{gaps, uncertainty, words};
 use scenecast_core::utc_text;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::Event;
@@ -42,7 +42,9 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     found.extend(dive.restarts_s.iter().map(|pause| restart("the surface's", *pause, String::new())));
     let pauses = vehicle.own.pauses().zip(&vehicle.own.set_backs);
     let told_of = |set_back: &Option<SetBack>| set_back.map_or_else(String::new, |set_back| set_back.told(dive));
-    found.extend(pauses.map(|(pause, set_back)| restart("the vehicle's", pause, told_of(set_back))));
+    found.extend(pauses.map(|(pause, set_back)| {
+        restart("the vehicle's", pause, told_of(set_back) + &uncertainty::lost(vehicle, pause))
+    }));
     found.extend(gaps::told(dive, vehicle));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     match found.is_empty() {

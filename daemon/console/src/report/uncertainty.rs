@@ -65,6 +65,19 @@ pub(super) fn told(vehicle: &DiveVehicle) -> String {
     format!("{begin} {}.", each.collect::<Vec<_>>().join(", and "))
 }
 
+/// How much less was known of its place after its program had not run, the end of a sentence; empty where about as much was.
+pub(super) fn lost(vehicle: &DiveVehicle, (stopped_s, began_s): (f64, f64)) -> String {
+    let mut known = vehicle.path().iter().filter(|point| point.sigma_m.is_finite());
+    let before_m = known.clone().rfind(|point| point.at_s <= stopped_s).map(|point| point.sigma_m);
+    let after_m = known.find(|point| point.at_s >= began_s).map(|point| point.sigma_m);
+    match before_m.zip(after_m) {
+        Some((before_m, after_m)) if after_m >= FAR_APART * before_m && after_m - before_m >= FAR_APART_M => {
+            format!("; the uncertainty of its place was {before_m:.1} m before and {after_m:.1} m after")
+        }
+        _ => String::new(),
+    }
+}
+
 /// One figure where both ends are the same for people.
 fn metres(least_m: f64, most_m: f64) -> String {
     let [least, most] = [least_m, most_m].map(|m| format!("{m:.1}"));
@@ -100,6 +113,15 @@ mod tests {
         };
         let track = sigmas.into_iter().enumerate().map(place).collect();
         told(&DiveVehicle { track, ..DiveVehicle::default() })
+    }
+
+    #[test]
+    fn a_place_that_a_restart_lost_is_told() {
+        let place = |(at_s, sigma_m)| TrackPoint { at_s, east_m: 0.0, north_m: 0.0, depth_m: 0.0, sigma_m };
+        let track = [(1.0, 1.0), (5.0, 1.0), (9.0, 50.0)].map(place).to_vec();
+        let vehicle = DiveVehicle { track, ..DiveVehicle::default() };
+        assert_eq!(lost(&vehicle, (5.5, 8.0)), "; the uncertainty of its place was 1.0 m before and 50.0 m after");
+        assert_eq!(lost(&vehicle, (2.0, 4.0)), "");
     }
 
     #[test]
