@@ -3,7 +3,6 @@
 use super::Escaped;
 use super::chart::{WIDTH, round_length};
 use super::dive::DiveVehicle;
-use super::track_point::TrackPoint;
 use scenecast_core::Area;
 use scenecast_protocol::map::Rect;
 use scenecast_surface::state::VehicleState;
@@ -37,14 +36,15 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area
     if let Some(corners) = corners {
         let _ = writeln!(svg, "<polygon class=\"area\" points=\"{}\"/>", points(&frame, corners.into_iter()));
     }
-    fence(&mut svg, &frame, state);
-    track(&mut svg, &frame, path, vehicle.legs());
-    numbers(&mut svg, &frame, bounds, &classes, state, vehicle);
+    let mut texts = Texts::default();
+    fence(&mut svg, &frame, state, &mut texts);
+    track(&mut svg, &frame, vehicle, &mut texts);
     for marker in &state.markers {
         let mut text: String = marker.text.chars().take(MAX_MARKER).collect();
         text += if marker.text.chars().count() > MAX_MARKER { "\u{2026}" } else { "" };
-        point(&mut svg, &frame, (marker.x_m, marker.y_m), (&text, -5.0));
+        point(&mut svg, &frame, (marker.x_m, marker.y_m), (&text, -5.0), &mut texts);
     }
+    numbers(&mut svg, &frame, bounds, &classes, (state, vehicle), &mut texts);
     scale(&mut svg, &frame);
     svg += "</svg>";
     Some(svg)
@@ -169,7 +169,7 @@ fn points(frame: &Frame, places: impl Iterator<Item = (f64, f64)>) -> String {
 }
 
 /// Fence and keep-outs that were in force at the end, and where the vehicle returns to.
-fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
+fn fence(svg: &mut String, frame: &Frame, state: &VehicleState, texts: &mut Texts) {
     let Some(order) = state.orders.fence_in_force.as_ref().map(|applied| &applied.order) else { return };
     let mut outline = |corners: &[[f64; 2]], class: &str| {
         let points = points(frame, corners.iter().map(|&[east_m, north_m]| (east_m, north_m)));
@@ -177,24 +177,66 @@ fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
     };
     order.fence.iter().for_each(|fence| outline(fence, "fence"));
     order.keep_outs.iter().for_each(|keep_out| outline(keep_out, "out"));
-    order.return_point.iter().for_each(|&[east_m, north_m]| point(svg, frame, (east_m, north_m), ("return", 16.0)));
+    order
+        .return_point
+        .iter()
+        .for_each(|&[east_m, north_m]| point(svg, frame, (east_m, north_m), ("return", 16.0), texts));
 }
 
-fn track<'a>(svg: &mut String, frame: &Frame, track: &[TrackPoint], legs: impl Iterator<Item = &'a [TrackPoint]>) {
-    for leg in legs.filter(|leg| leg.len() > 1) {
+/// The path of the vehicle, its ends, where its program began again, and where its images lie.
+fn track(svg: &mut String, frame: &Frame, vehicle: &DiveVehicle, texts: &mut Texts) {
+    for leg in vehicle.legs().filter(|leg| leg.len() > 1) {
         let points = points(frame, leg.iter().map(|point| (point.east_m, point.north_m)));
         let _ = writeln!(svg, "<polyline class=\"track\" points=\"{points}\"/>");
     }
-    for (end, name) in [(track.first(), "start"), (track.last(), "end")] {
-        end.into_iter().for_each(|end| point(svg, frame, (end.east_m, end.north_m), (name, -5.0)));
+    for (_, image) in vehicle.exemplars.iter().filter(|(_, image)| image.width_m > 0.0) {
+        let (x, y) = frame.place(image.middle.x, image.middle.y);
+        let _ =
+            writeln!(svg, "<rect class=\"point\" x=\"{:.1}\" y=\"{:.1}\" width=\"5\" height=\"5\"/>", x - 2.5, y - 2.5);
+    }
+    let path = vehicle.path();
+    let began = path.iter().zip(path.iter().skip(1)).filter(|(a, b)| vehicle.began_between(a, b));
+    let restarts = began.map(|(_, after)| (Some(after), "restart"));
+    for (place, name) in [(path.first(), "start"), (path.last(), "end")].into_iter().chain(restarts) {
+        place.into_iter().for_each(|place| point(svg, frame, (place.east_m, place.north_m), (name, -5.0), texts));
+    }
+}
+
+/// The rooms of the texts on a map, pixels: left, top, right, bottom.
+#[derive(Default)]
+struct Texts(Vec<[f64; 4]>);
+
+impl Texts {
+    /// The width of a character at the most, and the height of a line.
+    const CHARACTER: f64 = 7.5;
+    const LINE: f64 = 13.0;
+
+    /// Takes the room of a text from its left end and its base line on; false where another one is.
+    fn take(&mut self, text: &str, (left, base): (f64, f64)) -> bool {
+        let room = [left, base - Self::LINE + 2.0, left + text.chars().count() as f64 * Self::CHARACTER, base + 2.0];
+        let meets =
+            |other: &[f64; 4]| room[0] < other[2] && other[0] < room[2] && room[1] < other[3] && other[1] < room[3];
+        let is_free = !self.0.iter().any(meets);
+        self.0.extend(is_free.then_some(room));
+        is_free
     }
 }
 
 /// A place with its name, so many pixels below it.
-fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), (name, below): (&str, f64)) {
+fn point(
+    svg: &mut String,
+    frame: &Frame,
+    (east_m, north_m): (f64, f64),
+    (name, below): (&str, f64),
+    texts: &mut Texts,
+) {
     let (x, y) = frame.place(east_m, north_m);
     // A text near the right or the upper edge would be cut.
     let (side, anchor) = if x > WIDTH * 0.75 { (-6.0, "end") } else { (6.0, "start") };
+    let width = if side < 0.0 { name.chars().count() as f64 * Texts::CHARACTER } else { 0.0 };
+    // Two places of the vehicle may be the same: the name of the second stands lower.
+    let is_free = texts.take(name, (x + side - width, (y + below).max(12.0)));
+    let below = if is_free { below } else { below + Texts::LINE };
     let _ = writeln!(
         svg,
         "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
@@ -212,7 +254,14 @@ const NUMBER_ROOM: f64 = 7.0;
 const NUMBERS_APART: f64 = 110.0;
 
 /// The number of each class where it is wide, so that classes can be told apart in grey.
-fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
+fn numbers(
+    svg: &mut String,
+    frame: &Frame,
+    bounds: Rect,
+    classes: &[u8],
+    (state, vehicle): (&VehicleState, &DiveVehicle),
+    texts: &mut Texts,
+) {
     if bounds.area() > MAX_NUMBERED {
         return;
     }
@@ -222,11 +271,14 @@ fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state:
     for (class, (column, row)) in wide_places(classes, bounds.width as usize, room, apart) {
         let middle = |from: i32, cell: usize, shift: f64| (f64::from(from) + cell as f64 + 0.5) * edge + shift;
         let (x, y) = frame.place(middle(bounds.x, column, shift.0), middle(bounds.y, row, shift.1));
-        let _ = writeln!(
-            svg,
-            "<text class=\"number\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{class}</text>",
-            y + 4.0
-        );
+        let (number, base) = (class.to_string(), y + 4.0);
+        let left = x - number.len() as f64 * Texts::CHARACTER / 2.0;
+        if texts.take(&number, (left, base)) {
+            let _ = writeln!(
+                svg,
+                "<text class=\"number\" x=\"{x:.1}\" y=\"{base:.1}\" text-anchor=\"middle\">{number}</text>"
+            );
+        }
     }
 }
 
@@ -294,5 +346,13 @@ mod tests {
         let far = wide_places(&classes, 7, 1, 5.0);
         assert_eq!(far.iter().filter(|(class, _)| *class == 1).count(), 2, "{far:?}");
         assert_eq!(wide_places(&[], 0, 1, 1.0), []);
+    }
+
+    #[test]
+    fn texts_do_not_run_into_each_other() {
+        let mut texts = Texts::default();
+        assert!(texts.take("12", (100.0, 50.0)));
+        assert!(!texts.take("16", (110.0, 50.0)), "it would read 1216");
+        assert!(texts.take("16", (110.0, 70.0)) && texts.take("16", (120.0, 50.0)));
     }
 }

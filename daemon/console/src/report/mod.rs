@@ -6,6 +6,7 @@ mod chart;
 mod dive;
 mod doubts;
 mod extent;
+mod frames;
 mod gaps;
 mod images;
 mod in_force;

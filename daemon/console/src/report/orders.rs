@@ -78,6 +78,19 @@ impl DiveVehicle {
         content.get("labels")?.as_array().map(|labels| labels.iter().filter_map(Value::as_u64).collect())
     }
 
+    /// An order of the budget without what the one before it said too; any other order as it is.
+    fn changed(&self, (slot, version): &OrderKey, given: &Order) -> Order {
+        let members = |order: &Order| serde_json::from_str::<serde_json::Map<String, Value>>(&order.content).ok();
+        let before = self.given.range((slot.clone(), 0)..(slot.clone(), *version)).next_back();
+        let before = before.filter(|_| slot == SlotId::Budget.name()).and_then(|(_, before)| members(before));
+        let Some((before, mut now)) = before.zip(members(given)) else { return given.clone() };
+        now.retain(|name, value| before.get(name) != Some(value));
+        match now.is_empty() {
+            true => given.clone(),
+            false => Order { content: Value::Object(now).to_string(), ..given.clone() },
+        }
+    }
+
     /// What such an order says, in words.
     pub(super) fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
         let given = self.given.get(order)?;
@@ -97,7 +110,7 @@ impl DiveVehicle {
                 (false, false) => format!("images of {}, beside those of {}", named(new), named(awaited)),
             }
         });
-        Some(of_images.unwrap_or_else(|| words::content(&state.label_book, given)))
+        Some(of_images.unwrap_or_else(|| words::content(&state.label_book, &self.changed(order, given))))
     }
 }
 

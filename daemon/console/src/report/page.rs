@@ -12,6 +12,7 @@ use scenecast_surface::{LabelBook, LogKind};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::sync::LazyLock;
 
 const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
 table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;vertical-align:top;padding:.25em .6em;\
@@ -55,6 +56,8 @@ impl Dive {
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
+        let reported =
+            if recorded == scenecast_core::program() { String::new() } else { format!(", report by {program}") };
         let made_up: BTreeSet<String> = self.vehicles().filter_map(|(_, vehicle)| vehicle.made_up(self)).collect();
         let is_known = self.vehicles().all(|(_, vehicle)| !vehicle.own.settings.program.is_empty());
         let made_up: String = match made_up.is_empty() && !is_known {
@@ -69,7 +72,7 @@ impl Dive {
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, which {} wrote from {begin} to {end}. \
              The map is the operator's: what had arrived over the link. Areas are counts of cells. Names of classes are those at the end.</p>\n{}<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
-             sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}, report by {program}.</p>\n</body></html>",
+             sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}{reported}.</p>\n</body></html>",
             Escaped(recorded),
             self.files_table(),
             Escaped(&names.join(", ")),
@@ -106,7 +109,7 @@ impl Dive {
             let _ = writeln!(
                 page,
                 "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The operator's map at the end, each class with its number, and the \
-                 track of the vehicle: {}. {}{}Metres east and \
+                 track of the vehicle: {}. Squares: places of images. {}{}Metres east and \
                  north of the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
                 legend(state, vehicle),
                 match vehicle.own.track.len() {
@@ -134,8 +137,9 @@ impl Dive {
             event.source == LogKind::Record.name() && said(&event.text, |words| words.starts_with("label ")).is_some()
         };
         let rows = self.events.iter().filter(|(_, event)| is_change(event)).map(|(at_s, event)| {
-            let (vehicle, text) = (Escaped(&event.vehicle), Escaped(&event.text));
-            format!("<tr><td class=\"t\">{}</td><td class=\"t\">{vehicle}</td><td>{text}</td></tr>\n", utc_text(*at_s))
+            let (vehicle, told) = (Escaped(&event.vehicle), words::event(self.book(&event.vehicle), event));
+            let (at, told) = (utc_text(*at_s), Escaped(&told));
+            format!("<tr><td class=\"t\">{at}</td><td class=\"t\">{vehicle}</td><td>{told}</td></tr>\n")
         });
         let rows: String = rows.collect();
         if !rows.is_empty() {
@@ -145,15 +149,17 @@ impl Dive {
         }
     }
 
+    /// What the labels of a vehicle are called.
+    fn book(&self, vehicle: &str) -> &LabelBook {
+        static UNNAMED: LazyLock<LabelBook> = LazyLock::new(LabelBook::default);
+        let state = self.state.vehicles.iter().find(|state| state.name == vehicle);
+        state.map_or(&UNNAMED, |state| &state.label_book)
+    }
+
     fn events_table(&self, page: &mut String) {
         if self.events.is_empty() {
             return;
         }
-        let unnamed = LabelBook::default();
-        let book = |vehicle: &str| {
-            let state = self.state.vehicles.iter().find(|state| state.name == vehicle);
-            state.map_or(&unnamed, |state| &state.label_book)
-        };
         *page += "<h2>Events</h2>\n<table><thead><tr><th>time (UTC)</th><th>vehicle</th><th>kind</th><th>event</th></tr></thead>\n";
         for (at_s, event) in &self.events {
             let _ = writeln!(
@@ -162,7 +168,7 @@ impl Dive {
                 utc_text(*at_s),
                 Escaped(&event.vehicle),
                 Escaped(words::kind(&event.source)),
-                Escaped(&words::event(book(&event.vehicle), event))
+                Escaped(&words::event(self.book(&event.vehicle), event))
             );
         }
         *page += "</table>\n";

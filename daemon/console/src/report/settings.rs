@@ -38,10 +38,9 @@ impl SettingsRecord {
         }
         let _ = write!(
             page,
-            "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults, without files, folders, devices and \
+            "<h2>Settings of {}</h2>\n<p>Those of the configuration that differ from their defaults, without files, folders, devices and \
              addresses of the computer.</p>\n<table>",
-            Escaped(end),
-            Escaped(&self.program)
+            Escaped(end)
         );
         for (key, value) in self.told() {
             let _ = write!(page, "<tr><td>{}</td><td>{}</td></tr>", Escaped(key), Escaped(&value.to_string()));

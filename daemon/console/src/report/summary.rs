@@ -113,7 +113,8 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let (begin, end) = dive.span_s;
     let speed = match dive.is_scaled() {
         true => format!(
-            ", as the mission was played {} times as fast as real time (times are those of the clock; speeds and rates are those of the mission)",
+            ", as it was played {} times as fast as real time: times are those of the clock, with those of the mission in brackets, and speeds and \
+             rates are those of the mission",
             dive.state.mission.speed
         ),
         false => String::new(),
@@ -158,8 +159,11 @@ fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Opti
     };
     (reported > 0).then(|| {
         format!(
-            "In its last report, {} before the end of the record, the vehicle had {reported} cells; {held} had arrived by the end{}.{coarse}",
-            dive.lasted(before_end_s),
+            "In its last report{}, the vehicle had {reported} cells; {held} had arrived by the end{}.{coarse}",
+            match before_end_s < 1.0 {
+                true => String::new(),
+                false => format!(", {} before the end of the record", dive.lasted(before_end_s)),
+            },
             match held > reported {
                 true => ", as it mapped and sent more after that".to_owned(),
                 false => format!(", {share:.0} %"),

@@ -28,7 +28,7 @@ pub(super) fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
     if vehicle.is_played_back() {
         let source = all.told().get("camera.source").and_then(|source| Some(source.as_str()?.to_owned()));
         return format!(
-            "What was played back, {}, decides its speed, its altitude and its path, which no order changes; times are those of the playback. By \
+            "What was played back, {}, decides its speed, its altitude and its path, which no order changes. By \
              its settings its images are taken to be from {} m above the sea floor, where nothing measured that, and their pixels to be {} m wide \
              there.",
             source.unwrap_or_default(),
