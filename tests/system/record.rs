@@ -95,7 +95,7 @@ fn a_report_says_what_the_record_has() {
         "rehearsal over a simulated sea floor",
         "had arrived by the end",
         "aria-label=\"scale\"",
-        "<h3>Link over range</h3>",
+        "<h3>Link by round trip</h3>",
     ] {
         assert!(page.contains(part), "{part}");
     }

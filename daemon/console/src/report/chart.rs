@@ -1,108 +1,10 @@
-//! The figures of a report as SVG: the map with its track, and lines over time. They are readable in print.
+//! The lines over time of a report as SVG, and its scales. They are readable in print.
 
-use super::Escaped;
-use super::dive::DiveVehicle;
-use super::track_point::TrackPoint;
-use scenecast_core::{Area, utc_text};
-use scenecast_protocol::map::Rect;
-use scenecast_surface::state::VehicleState;
-use std::collections::BTreeMap;
-use std::fmt::Write;
+use super::{Escaped, gaps};
+use scenecast_core::utc_text;
 
 /// Width of a figure, pixels.
-const WIDTH: f64 = 760.0;
-/// Where nothing was measured for so long, a line over time has a gap, seconds.
-const MAX_GAP_S: f64 = 45.0;
-/// Characters of a marker's text on the map.
-const MAX_MARKER: usize = 30;
-
-/// The map of the operator, north up, with the reported track, a grid of metres, a scale bar and an arrow to the north; `None` without
-/// cells.
-pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area>) -> Option<String> {
-    let bounds = vehicle.labels.bounds()?;
-    let shift = state.map.shift_m();
-    let path = vehicle.path();
-    let places = path.iter().map(|point| (point.east_m, point.north_m));
-    let fence_in_force = state.orders.fence_in_force.iter().flat_map(|applied| applied.order.fence.iter().flatten());
-    let places = places.chain(state.markers.iter().map(|m| (m.x_m, m.y_m)));
-    let places = places.chain(fence_in_force.map(|&[east_m, north_m]| (east_m, north_m)));
-    let corners =
-        area.map(|Area { west, south, east, north }| [(west, south), (east, south), (east, north), (west, north)]);
-    let places = places.chain(corners.into_iter().flatten());
-    let frame = Frame::around(bounds, vehicle.cell_m, shift, places);
-    let mut svg = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
-        frame.height_px() + 40.0
-    );
-    let classes = classes(bounds, state, vehicle);
-    cells(&mut svg, &frame, bounds, &classes, state, vehicle);
-    grid(&mut svg, &frame);
-    if let Some(corners) = corners {
-        let _ = writeln!(svg, "<polygon class=\"area\" points=\"{}\"/>", points(&frame, corners.into_iter()));
-    }
-    fence(&mut svg, &frame, state);
-    track(&mut svg, &frame, path, vehicle.legs());
-    numbers(&mut svg, &frame, bounds, &classes, state, vehicle);
-    for marker in &state.markers {
-        let mut text: String = marker.text.chars().take(MAX_MARKER).collect();
-        text += if marker.text.chars().count() > MAX_MARKER { "\u{2026}" } else { "" };
-        point(&mut svg, &frame, (marker.x_m, marker.y_m), (&text, -5.0));
-    }
-    scale(&mut svg, &frame);
-    svg += "</svg>";
-    Some(svg)
-}
-
-/// The part of the world that a figure shows, metres, and its scale.
-struct Frame {
-    west: f64,
-    south: f64,
-    east: f64,
-    north: f64,
-    px_m: f64,
-}
-
-impl Frame {
-    /// The map, and places within its own size around it: one that is far away must not make the map small.
-    fn around(
-        Rect { x, y, width, height }: Rect,
-        cell_m: f64,
-        (east_m, north_m): (f64, f64),
-        places: impl Iterator<Item = (f64, f64)>,
-    ) -> Self {
-        let west = f64::from(x) * cell_m + east_m;
-        let south = f64::from(y) * cell_m + north_m;
-        let (east, north) = (west + f64::from(width) * cell_m, south + f64::from(height) * cell_m);
-        let reach = (east - west).max(north - south);
-        let is_near = |(x, y): &(f64, f64)| {
-            (*x - x.clamp(west, east)).abs() <= reach && (*y - y.clamp(south, north)).abs() <= reach
-        };
-        let whole = places.filter(is_near).fold((west, south, east, north), |(west, south, east, north), (x, y)| {
-            (west.min(x), south.min(y), east.max(x), north.max(y))
-        });
-        let (west, south, east, north) = whole;
-        // Marks at an edge are whole.
-        let edge = 0.012 * (east - west).max(north - south);
-        let (south, north) = (south - edge, north + edge);
-        // A narrow map gets room at its sides.
-        let margin = ((north - south) * 0.6 - (east - west)).max(0.0) / 2.0 + 0.02 * (east - west);
-        let (west, east) = (west - margin, east + margin);
-        Self { west, south, east, north, px_m: WIDTH / (east - west) }
-    }
-
-    fn height_px(&self) -> f64 {
-        (self.north - self.south) * self.px_m
-    }
-
-    fn place(&self, east_m: f64, north_m: f64) -> (f64, f64) {
-        ((east_m - self.west) * self.px_m, (self.north - north_m) * self.px_m)
-    }
-
-    /// A round length of about a fifth of the width, metres.
-    fn step_m(&self) -> f64 {
-        round_length((self.east - self.west) / 5.0)
-    }
-}
+pub(super) const WIDTH: f64 = 760.0;
 
 /// The next lower of 1, 2 and 5 times a power of ten.
 pub(super) fn round_length(length: f64) -> f64 {
@@ -126,191 +28,10 @@ pub(super) fn scale_of_image(width_m: f64) -> String {
     )
 }
 
-/// The class of each cell of a part of the map, row by row from the south; 0 is none.
-fn classes(Rect { x, y, width, height }: Rect, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<u8> {
-    let labels = vehicle.labels.copy_area(i64::from(x), i64::from(y), width as usize, height as usize);
-    labels.into_iter().map(|label| state.label_book.shown_as(label)).collect()
-}
-
-/// Cells of one class side by side in a row are one rectangle.
-fn cells(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
-    let shift = state.map.shift_m();
-    let edge = vehicle.cell_m;
-    let mut runs: BTreeMap<u8, String> = BTreeMap::new();
-    for (row, classes) in classes.chunks(bounds.width.max(1) as usize).enumerate() {
-        let north = (f64::from(bounds.y) + row as f64 + 1.0) * edge + shift.1;
-        let mut column = 0;
-        for run in classes.chunk_by(|a, b| a == b) {
-            if let Some(&class) = run.first().filter(|class| **class != 0) {
-                let west = (f64::from(bounds.x) + column as f64) * edge + shift.0;
-                let (x, y) = frame.place(west, north);
-                let path = runs.entry(class).or_default();
-                let (width, height) = (run.len() as f64 * edge * frame.px_m, edge * frame.px_m);
-                // Writing to a string cannot fail.
-                let _ = write!(path, "M{x:.2} {y:.2}h{width:.2}v{height:.2}h-{width:.2}z");
-            }
-            column += run.len();
-        }
-    }
-    for (label, path) in runs {
-        let _ = writeln!(
-            svg,
-            "<path fill=\"{}\" shape-rendering=\"crispEdges\" d=\"{path}\"/>",
-            state.label_book.colour_text(label)
-        );
-    }
-}
-
-fn grid(svg: &mut String, frame: &Frame) {
-    let step = frame.step_m();
-    let height = frame.height_px();
-    let lines = |from: f64, to: f64| {
-        let first = (from / step).ceil() as i64;
-        (first..).map(move |n| n as f64 * step).take_while(move |at| *at <= to)
-    };
-    for east in lines(frame.west, frame.east) {
-        let (x, _) = frame.place(east, frame.north);
-        let _ = writeln!(
-            svg,
-            "<path class=\"grid\" d=\"M{x:.1} 0V{height:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{east} m E</text>",
-            x.clamp(26.0, WIDTH - 26.0),
-            height + 14.0
-        );
-    }
-    for north in lines(frame.south, frame.north) {
-        let (_, y) = frame.place(frame.west, north);
-        let _ = writeln!(
-            svg,
-            "<path class=\"grid\" d=\"M0 {y:.1}H{WIDTH}\"/><text x=\"2\" y=\"{:.1}\">{north} m N</text>",
-            y - 3.0
-        );
-    }
-}
-
-/// Places in metres east and north as the points of a line.
-fn points(frame: &Frame, places: impl Iterator<Item = (f64, f64)>) -> String {
-    let points = places.map(|(east_m, north_m)| frame.place(east_m, north_m));
-    points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
-}
-
-/// Fence and keep-outs that were in force at the end, and where the vehicle returns to.
-fn fence(svg: &mut String, frame: &Frame, state: &VehicleState) {
-    let Some(order) = state.orders.fence_in_force.as_ref().map(|applied| &applied.order) else { return };
-    let mut outline = |corners: &[[f64; 2]], class: &str| {
-        let points = points(frame, corners.iter().map(|&[east_m, north_m]| (east_m, north_m)));
-        let _ = writeln!(svg, "<polygon class=\"{class}\" points=\"{points}\"/>");
-    };
-    order.fence.iter().for_each(|fence| outline(fence, "fence"));
-    order.keep_outs.iter().for_each(|keep_out| outline(keep_out, "out"));
-    order.return_point.iter().for_each(|&[east_m, north_m]| point(svg, frame, (east_m, north_m), ("return", 16.0)));
-}
-
-fn track<'a>(svg: &mut String, frame: &Frame, track: &[TrackPoint], legs: impl Iterator<Item = &'a [TrackPoint]>) {
-    for leg in legs.filter(|leg| leg.len() > 1) {
-        let points = points(frame, leg.iter().map(|point| (point.east_m, point.north_m)));
-        let _ = writeln!(svg, "<polyline class=\"track\" points=\"{points}\"/>");
-    }
-    for (end, name) in [(track.first(), "start"), (track.last(), "end")] {
-        end.into_iter().for_each(|end| point(svg, frame, (end.east_m, end.north_m), (name, -5.0)));
-    }
-}
-
-/// A place with its name, so many pixels below it.
-fn point(svg: &mut String, frame: &Frame, (east_m, north_m): (f64, f64), (name, below): (&str, f64)) {
-    let (x, y) = frame.place(east_m, north_m);
-    // A text near the right or the upper edge would be cut.
-    let (side, anchor) = if x > WIDTH * 0.75 { (-6.0, "end") } else { (6.0, "start") };
-    let _ = writeln!(
-        svg,
-        "<circle class=\"point\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/><text class=\"number\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
-        x + side,
-        (y + below).max(12.0),
-        Escaped(name)
-    );
-}
-
-/// Most cells of a map whose classes are numbered.
-const MAX_NUMBERED: u64 = 1 << 22;
-
-/// The least room for a number, and how far numbers of one class are apart, pixels.
-const NUMBER_ROOM: f64 = 7.0;
-const NUMBERS_APART: f64 = 110.0;
-
-/// The number of each class where it is wide, so that classes can be told apart in grey.
-fn numbers(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
-    if bounds.area() > MAX_NUMBERED {
-        return;
-    }
-    let (shift, edge) = (state.map.shift_m(), vehicle.cell_m);
-    let cell_px = edge * frame.px_m;
-    let (room, apart) = ((NUMBER_ROOM / cell_px).ceil() as u32, NUMBERS_APART / cell_px);
-    for (class, (column, row)) in wide_places(classes, bounds.width as usize, room, apart) {
-        let middle = |from: i32, cell: usize, shift: f64| (f64::from(from) + cell as f64 + 0.5) * edge + shift;
-        let (x, y) = frame.place(middle(bounds.x, column, shift.0), middle(bounds.y, row, shift.1));
-        let _ = writeln!(
-            svg,
-            "<text class=\"number\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{class}</text>",
-            y + 4.0
-        );
-    }
-}
-
-/// Columns and rows of cells of each class that are far, along both axes, from the ends of their runs: the farthest of all, and those with
-/// at least so much room, `apart` cells from each other; 0 is no class.
-fn wide_places(classes: &[u8], width: usize, least_room: u32, apart: f64) -> Vec<(u8, (usize, usize))> {
-    let height = classes.len() / width.max(1);
-    let mut room = vec![u32::MAX; classes.len()];
-    // The lengths so far of runs in each of the four directions.
-    let mut measure = |line: &mut dyn Iterator<Item = usize>| {
-        let (mut before, mut length) = (0, 0);
-        for cell in line {
-            length = if classes[cell] == before { length + 1 } else { 1 };
-            before = classes[cell];
-            room[cell] = room[cell].min(length);
-        }
-    };
-    for row in 0..height {
-        measure(&mut (0..width).map(|column| row * width + column));
-        measure(&mut (0..width).rev().map(|column| row * width + column));
-    }
-    for column in 0..width {
-        measure(&mut (0..height).map(|row| row * width + column));
-        measure(&mut (0..height).rev().map(|row| row * width + column));
-    }
-    let mut found: BTreeMap<u8, Vec<(usize, usize)>> = BTreeMap::new();
-    let mut cells: Vec<usize> = (0..classes.len()).filter(|cell| classes[*cell] != 0).collect();
-    cells.sort_by_key(|cell| (std::cmp::Reverse(room[*cell]), *cell));
-    for cell in cells {
-        let (column, row) = (cell % width, cell / width);
-        let places = found.entry(classes[cell]).or_default();
-        let is_far = |&(x, y): &(usize, usize)| (x.abs_diff(column) as f64).hypot(y.abs_diff(row) as f64) >= apart;
-        if places.is_empty() || room[cell] >= least_room && places.iter().all(is_far) {
-            places.push((column, row));
-        }
-    }
-    found.into_iter().flat_map(|(class, places)| places.into_iter().map(move |place| (class, place))).collect()
-}
-
-fn scale(svg: &mut String, frame: &Frame) {
-    let (length, y) = (frame.step_m(), frame.height_px() + 28.0);
-    let (end, right) = (10.0 + length * frame.px_m, WIDTH - 14.0);
-    let _ = writeln!(
-        svg,
-        "<path class=\"scale\" d=\"M10 {y:.1}H{end:.1}M10 {a:.1}v8M{end:.1} {a:.1}v8\"/><text x=\"{:.1}\" y=\"{:.1}\">{length} m</text>\
-         <path class=\"scale\" d=\"M{right} {:.1}v-18l-5 7m5-7l5 7\"/><text x=\"{:.1}\" y=\"{:.1}\">N</text>",
-        end + 6.0,
-        y + 4.0,
-        y + 10.0,
-        right - 18.0,
-        y + 4.0,
-        a = y - 4.0
-    );
-}
-
 /// The values of one quantity from which [`line`] draws a chart.
 pub(super) struct Series<'a> {
     pub(super) name: &'a str,
-    pub(super) unit: &'a str,
+    pub(super) unit: String,
     /// Seconds since the beginning, and the value; NaN where it is unknown.
     pub(super) points: Vec<(f64, f64)>,
 }
@@ -328,9 +49,8 @@ pub(super) fn line(series: &Series<'_>, begin_s: f64, length_s: f64) -> Option<S
         let x = 60.0 + (at_s / length_s).clamp(0.0, 1.0) * (WIDTH - 70.0);
         format!("{x:.1} {:.1}", HEIGHT - 20.0 - value / top * (HEIGHT - 42.0))
     };
-    let most_apart_s = MAX_GAP_S.max(3.0 * length_s / known.len() as f64);
-    let lines = known.chunk_by(|a, b| b.0 - a.0 <= most_apart_s).map(|row| {
-        let points: Vec<String> = row.iter().map(place).collect();
+    let lines = rows(&series.points).into_iter().map(|row| {
+        let points: Vec<String> = thinned(&row, length_s / WIDTH).iter().map(place).collect();
         // A point alone is a dot.
         format!("M{}h0", points.join("L"))
     });
@@ -342,7 +62,7 @@ pub(super) fn line(series: &Series<'_>, begin_s: f64, length_s: f64) -> Option<S
          <text x=\"60\" y=\"{low}\">{begin} UTC</text><text x=\"{half}\" y=\"{low}\" text-anchor=\"middle\">{noon}</text>\
          <text x=\"{WIDTH}\" y=\"{low}\" text-anchor=\"end\">{end} UTC</text></svg>",
         name = Escaped(series.name),
-        unit = Escaped(series.unit),
+        unit = Escaped(&series.unit),
         bottom = HEIGHT - 20.0,
         middle = (HEIGHT - 20.0 + 22.0) / 2.0,
         low = HEIGHT - 4.0,
@@ -352,6 +72,28 @@ pub(super) fn line(series: &Series<'_>, begin_s: f64, length_s: f64) -> Option<S
         begin = clock(begin_s),
         end = clock(begin_s + length_s)
     ))
+}
+
+/// The points of a line without those of unknown values, apart where one is unknown or comes far later than usual.
+fn rows(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
+    let times: Vec<f64> = points.iter().map(|(at_s, _)| *at_s).collect();
+    let most_apart_s = gaps::unusual_s(&times);
+    let is_near = |a: &(f64, f64), b: &(f64, f64)| b.0 - a.0 <= most_apart_s && a.1.is_finite() && b.1.is_finite();
+    points.chunk_by(is_near).filter(|row| row[0].1.is_finite()).map(<[_]>::to_vec).collect()
+}
+
+/// Of the points within each so many seconds, the least and the greatest one.
+fn thinned(row: &[(f64, f64)], column_s: f64) -> Vec<(f64, f64)> {
+    let column = |point: &(f64, f64)| (point.0 / column_s).floor();
+    let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+    let ends = row.chunk_by(|a, b| column(a) == column(b)).flat_map(|points| {
+        let mut ends: Vec<(f64, f64)> =
+            points.iter().min_by(by_value).into_iter().chain(points.iter().max_by(by_value)).copied().collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ends.dedup();
+        ends
+    });
+    ends.collect()
 }
 
 /// Month, day, hours, minutes and seconds of a moment, UTC.
@@ -379,12 +121,17 @@ mod tests {
     }
 
     #[test]
-    fn a_class_is_numbered_where_it_is_wide() {
-        let map = "1111111 1333111 1333220 1333222 1111222";
-        let classes: Vec<u8> = map.bytes().filter(u8::is_ascii_digit).map(|digit| digit - b'0').collect();
-        assert_eq!(wide_places(&classes, 7, 9, 1.0), [(1, (0, 0)), (2, (5, 3)), (3, (2, 2))]);
-        let far = wide_places(&classes, 7, 1, 5.0);
-        assert_eq!(far.iter().filter(|(class, _)| *class == 1).count(), 2, "{far:?}");
-        assert_eq!(wide_places(&[], 0, 1, 1.0), []);
+    fn a_line_breaks_where_nothing_is_known() {
+        let lengths = |points: &[(f64, f64)]| rows(points).iter().map(Vec::len).collect::<Vec<_>>();
+        let at = |s: u32| (f64::from(s), 1.0);
+        let paused: Vec<_> = (0..40).chain(70..99).map(at).collect();
+        assert_eq!(lengths(&paused), [40, 29], "30 s where a second is usual");
+        let seldom: Vec<_> = (0..9).map(|n| at(n * 60)).collect();
+        assert_eq!(lengths(&seldom), [9], "a minute is usual");
+        assert_eq!(lengths(&[at(0), at(1), (2.0, f64::NAN), at(3)]), [2, 1]);
+        assert_eq!(
+            thinned(&[(0.0, 1.0), (0.1, 9.0), (0.2, 3.0), (1.5, 2.0)], 1.0),
+            [(0.0, 1.0), (0.1, 9.0), (1.5, 2.0)]
+        );
     }
 }

@@ -1,9 +1,11 @@
 //! What a reader of a report must not trust.
 
 use super::dive::{Dive, DiveVehicle};
+use super::orders::said;
 use super::{extent, gaps, words};
 use scenecast_core::utc_text;
 use scenecast_files::HOW_TO_RECOVER;
+use scenecast_surface::LogKind;
 use scenecast_surface::state::VehicleState;
 
 /// A place with a greater standard deviation is worth a sentence, metres.
@@ -23,10 +25,9 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
             utc_text(*stopped_s)
         )
     }));
-    sentences.extend(
-        vehicle.made_up(dive).map(|what| format!("Positions or images are not those of a real dive: this was {what}.")),
-    );
+    sentences.extend(not_real(dive, vehicle));
     sentences.extend(place(dive, state, vehicle));
+    sentences.extend(relabelled(dive, state));
     sentences.extend(images(state, vehicle));
     if vehicle.own.runs_s.is_empty() {
         if !vehicle.restarts_s.is_empty() {
@@ -47,6 +48,48 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
         );
     }
     sentences
+}
+
+/// What of the dive was made up.
+fn not_real(dive: &Dive, vehicle: &DiveVehicle) -> Option<String> {
+    vehicle.made_up(dive)?;
+    let what = if dive.settings.is_rehearsal() {
+        "The sea floor, the images, the motion, the losses and the range of the link, and the energy are made up by the rehearsal."
+    } else if vehicle.is_played_back() {
+        "The images and the poses are those of a recording, which nobody steered; what the link lost is real only if the modems were."
+    } else {
+        "The motion of the vehicle was simulated; what the link lost is real only if the modems were."
+    };
+    Some(what.to_owned())
+}
+
+/// The last time at which much of the map got other labels.
+fn relabelled(dive: &Dive, state: &VehicleState) -> Option<String> {
+    const MUCH: f64 = 0.05;
+    let of_it = || dive.events.iter().filter(|(_, event)| event.vehicle == state.name);
+    let corrected = of_it().filter(|(_, event)| event.source == LogKind::Label.name());
+    let shares = corrected.filter_map(|(at_s, event)| {
+        let (changed, rest) = event.text.strip_prefix("the map is corrected: ")?.split_once(" of ")?;
+        let [changed, all] = [changed, rest.split(' ').next()?].map(|count| count.parse::<f64>().ok());
+        Some((*at_s, changed? / all?))
+    });
+    let shares: Vec<(f64, f64)> = shares.filter(|(_, share)| *share >= MUCH).collect();
+    let (at_s, share) = *shares.last()?;
+    let named = of_it().filter(|(named_s, event)| {
+        let is_name = |words: &str| words.starts_with("label ") && words.contains(": name ");
+        event.source == LogKind::Record.name() && *named_s < at_s && said(&event.text, is_name).is_some()
+    });
+    let before = match shares.len() {
+        1 => String::new(),
+        n => format!(" The map had been corrected so {} before.", words::counted(n - 1, "time", "times")),
+    };
+    let doubtful = if named.count() > 0 { "names given and images sent" } else { "images sent and weights ordered" };
+    Some(format!(
+        "The scene model changed the class of {:.0} % of the cells at {}, {} before the end; {doubtful} before it may mean another class.{before}",
+        share * 100.0,
+        utc_text(at_s),
+        dive.lasted(dive.span_s.1 - at_s)
+    ))
 }
 
 /// How many images lie where the map has another class.
@@ -87,6 +130,7 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<Str
 mod tests {
     use super::super::track_point::TrackPoint;
     use super::*;
+    use scenecast_messages::scenecast_msgs::Event;
 
     #[test]
     fn a_restart_that_only_the_surface_knows_is_a_doubt() {
@@ -119,5 +163,23 @@ mod tests {
         let told = told(&[1.0, 50.0, 40.0, 0.5, 0.5, 6.0, 1.0]).unwrap();
         assert!(told.starts_with("Between 1970-01-01T00:00:01Z and 1970-01-01T00:00:05Z, for 3 s in all"), "{told}");
         assert!(told.contains("50 m at most"), "{told}");
+    }
+
+    #[test]
+    fn labels_that_changed_late_are_a_doubt() {
+        let (mut dive, state) = (Dive::default(), VehicleState::default());
+        (dive.span_s, dive.state.mission.speed) = ((0.0, 100.0), 1.0);
+        let event = |(at_s, source, text): (f64, LogKind, &str)| {
+            (at_s, Event { source: source.name().to_owned(), text: text.to_owned(), ..Event::default() })
+        };
+        let corrected = |cells: &str| format!("the map is corrected: {cells} cells have another label, in 8.5 kbit");
+        let (little, much) = (corrected("10 of 6204"), corrected("2755 of 6204"));
+        dive.events = [(20.0, LogKind::Label, little.as_str())].map(event).to_vec();
+        assert_eq!(relabelled(&dive, &state), None);
+        let name = (30.0, LogKind::Record, "ingrid: label 1: name gravel");
+        dive.events.extend([name, (73.0, LogKind::Label, much.as_str())].map(event));
+        let told = "The scene model changed the class of 44 % of the cells at 1970-01-01T00:01:13Z, 27 s before the end; names given and images \
+                    sent before it may mean another class.";
+        assert_eq!(relabelled(&dive, &state).as_deref(), Some(told));
     }
 }

@@ -70,12 +70,13 @@ fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64,
     });
     let Area { west, south, east, north } = area;
     let all_m2 = (east - west) * (north - south);
-    format!(
-        " Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {:.1} % is on the map, and {} of {} are not.{fence}",
-        share * 100.0,
-        words::area(all_m2 * (1.0 - share)),
-        words::area(all_m2)
-    )
+    let (all, missing) = (words::area(all_m2), words::area(all_m2 * (1.0 - share)));
+    let seen = match share {
+        share if share >= 1.0 - f64::EPSILON => format!("all {all} are on the map"),
+        share if share >= 0.9995 => format!("all but {missing} of {all} are on the map"),
+        share => format!("{:.1} % is on the map, and {missing} of {all} are not", share * 100.0),
+    };
+    format!(" Of the area of the survey, {west} to {east} m east and {south} to {north} m north, {seen}.{fence}")
 }
 
 /// The share of what the fence in force leaves that has cells; `None` without a fence.

@@ -4,70 +4,83 @@ use super::dive::{Dive, DiveVehicle};
 use super::words::{counted, median};
 use scenecast_core::utc_text;
 
-/// Mission time without a frame that is never told, seconds.
-const SHORT_S: f64 = 15.0;
-/// A pause is told from so many usual ones on.
+/// Mission time without a frame that is no silence, seconds.
+const SHORT_S: f64 = 30.0;
+/// A silence is as long as so many usual pauses.
 const USUAL: f64 = 5.0;
-/// Pauses that are told; of more, the longest.
+/// Silences and gaps that are told; of more, the longest.
 const MAX_TOLD: usize = 6;
-/// Mission time without a place in a vehicle's own record from which on it is a gap, seconds.
-const MAX_PLACES_APART_S: f64 = 5.0;
+/// Mission time without a place in a vehicle's own record that is no gap, however often it has one, seconds.
+const NO_GAP_S: f64 = 10.0;
 
-/// How often frames of a vehicle were heard and, by its own record, those of the surface on board, with the longer pauses.
+/// How often frames of a vehicle were heard and, by its own record, those of the surface on board.
 pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let Some(last_s) = vehicle.heard_s.last() else { return vec!["No frame from it was heard.".to_owned()] };
-    let last = format!(
-        "The last frame from it was heard at {}, {} before the end of the record.",
-        utc_text(*last_s),
-        dive.lasted(dive.surface_s.1 - last_s)
-    );
-    let surface = format!("The surface heard {}", pauses(dive, &vehicle.heard_s, dive.surface_s));
-    let span = vehicle.own.runs_s.first().zip(vehicle.own.runs_s.last()).map(|(first, last)| (first.0, last.1));
-    let own = span.map(|span| {
-        format!("On board, of what it could use of the surface, it heard {}", pauses(dive, &vehicle.own.heard_s, span))
+    let before_end_s = dive.surface_s.1 - last_s;
+    let last = match before_end_s < 1.0 {
+        true => "The last frame from it was heard at the end of the record.".to_owned(),
+        false => format!(
+            "The last frame from it was heard at {}, {} before the end of the record.",
+            utc_text(*last_s),
+            dive.lasted(before_end_s)
+        ),
+    };
+    let surface = format!("At the surface {}", age(dive, &vehicle.heard_s, dive.surface_s.1));
+    let own = vehicle.own.runs_s.last().map(|run| {
+        format!("On board, of what it could use of the surface, {}", age(dive, &vehicle.own.heard_s, run.1))
     });
     [last, surface].into_iter().chain(own).collect()
 }
 
-/// Whether the surface has heard nothing for longer than usual.
-pub(super) fn has_silence(dive: &Dive, vehicle: &DiveVehicle) -> bool {
-    !long(dive, &vehicle.heard_s, dive.surface_s).1.is_empty()
-}
-
-/// The usual pause between these moments, mission seconds, if there are any, and begin and end of those that are longer.
-fn long(dive: &Dive, times_s: &[f64], (begin_s, end_s): (f64, f64)) -> (Option<f64>, Vec<(f64, f64)>) {
+/// Begin and end of the pauses between these moments that are longer than usual.
+fn long(dive: &Dive, times_s: &[f64], (begin_s, end_s): (f64, f64)) -> Vec<(f64, f64)> {
     let times = || times_s.iter().copied();
     let all = std::iter::once(begin_s).chain(times()).zip(times().chain([end_s]));
     let lengths = times().zip(times().skip(1)).map(|(from_s, to_s)| dive.mission_s(to_s - from_s));
     let usual_s = median(&lengths.collect::<Vec<f64>>());
     let least_s = SHORT_S.max(USUAL * usual_s.unwrap_or_default());
-    (usual_s, all.filter(|(from_s, to_s)| dive.mission_s(to_s - from_s) >= least_s).collect())
+    all.filter(|(from_s, to_s)| dive.mission_s(to_s - from_s) >= least_s).collect()
 }
 
-/// The rest of a sentence about them.
-fn pauses(dive: &Dive, times_s: &[f64], span_s: (f64, f64)) -> String {
-    let (usual_s, long) = long(dive, times_s, span_s);
-    let all = long.len();
-    let told: Vec<String> = longest(long)
-        .iter()
-        .map(|gap| format!("{} from {} to {}", dive.lasted(gap.1 - gap.0), utc_text(gap.0), utc_text(gap.1)))
-        .collect();
-    let pauses = match all {
-        0 => {
-            let pauses = times_s.iter().zip(&times_s[1.min(times_s.len())..]).map(|(a, b)| b - a);
-            let longest = pauses.fold(0.0, f64::max);
-            format!("the longest pause was {}", dive.lasted(longest))
-        }
-        n if n > told.len() => format!("with {n} longer pauses, the longest of which were {}", told.join(", ")),
-        n => format!("with {}: {}", counted(n, "longer pause", "longer pauses"), told.join(", ")),
-    };
-    let heard = counted(times_s.len(), "frame", "frames");
-    match usual_s {
-        Some(_) => format!(
-            "{heard}; half of the time, the last one was at most {} old, {pauses}.",
-            dive.lasted_tenths(half_of_time_s(times_s, span_s.1))
+/// Begin and end of the times in which the surface heard nothing of a vehicle for longer than usual.
+pub(super) fn silences(dive: &Dive, vehicle: &DiveVehicle) -> Vec<(f64, f64)> {
+    long(dive, &vehicle.heard_s, dive.surface_s)
+}
+
+/// The silences at the surface and, by the vehicle's own record, on board, with their begins: each once, in words.
+pub(super) fn told(dive: &Dive, vehicle: &DiveVehicle) -> Vec<(f64, String)> {
+    let at_surface = longest(silences(dive, vehicle));
+    let more = silences(dive, vehicle).len() - at_surface.len();
+    let runs_s = &vehicle.own.runs_s;
+    let span = runs_s.first().zip(runs_s.last()).map(|(first, last)| (first.0, last.1));
+    let on_board = longest(span.map_or_else(Vec::new, |span| long(dive, &vehicle.own.heard_s, span)));
+    let meets = |a: &(f64, f64), b: &(f64, f64)| a.0 < b.1 && b.0 < a.1;
+    let until = |gap: &(f64, f64)| format!("until {}, for {}", utc_text(gap.1), dive.lasted(gap.1 - gap.0));
+    let mut told: Vec<(f64, String)> = Vec::new();
+    for gap in &at_surface {
+        let own = on_board.iter().filter(|own| meets(own, gap));
+        let own = own
+            .map(|own| format!("; on board nothing of the surface was heard from {} {}", utc_text(own.0), until(own)));
+        let what = if gap.0 <= dive.surface_s.0 { "had not heard it yet" } else { "heard nothing from it" };
+        told.push((gap.0, format!("the surface {what} {}{}", until(gap), own.collect::<String>())));
+    }
+    let alone = on_board.iter().filter(|own| !at_surface.iter().any(|gap| meets(own, gap)));
+    told.extend(alone.map(|own| (own.0, format!("on board nothing of the surface was heard {}", until(own)))));
+    if more > 0 {
+        told.push((dive.surface_s.1, format!("by then {}", counted(more, "shorter silence", "shorter silences"))));
+    }
+    told
+}
+
+/// How old the last of these moments was, the rest of a sentence.
+fn age(dive: &Dive, times_s: &[f64], end_s: f64) -> String {
+    match times_s.len() {
+        0 => "no frame was heard.".to_owned(),
+        1 => "one frame was heard.".to_owned(),
+        _ => format!(
+            "the last frame that was heard was at most {} old half of the time.",
+            dive.lasted_tenths(half_of_time_s(times_s, end_s))
         ),
-        None => format!("{heard}, {pauses}."),
     }
 }
 
@@ -99,9 +112,11 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let restarted = |gap: &(f64, f64)| dive.restarts_s.iter().any(|(from_s, to_s)| gap.0 < *to_s && *from_s < gap.1);
     let idle = dive.gaps_s.iter().filter(|gap| !restarted(gap));
     let idle = idle.map(|gap| format!("The surface recorded nothing {}.", span(gap)));
-    let pairs = vehicle.own.track.windows(2).map(|pair| (pair[0].at_s, pair[1].at_s));
+    let places: Vec<f64> = vehicle.own.track.iter().map(|point| point.at_s).collect();
+    let least_s = NO_GAP_S.max(dive.mission_s(unusual_s(&places)));
+    let pairs = places.windows(2).map(|pair| (pair[0], pair[1]));
     let holes = pairs.filter(|(from_s, to_s)| {
-        dive.mission_s(to_s - from_s) > MAX_PLACES_APART_S
+        dive.mission_s(to_s - from_s) > least_s
             && !vehicle.own.pauses().any(|pause| *from_s < pause.1 && pause.0 < *to_s)
     });
     let holes: Vec<(f64, f64)> = holes.collect();
@@ -110,8 +125,9 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     let holes = longest(holes);
     let stood = holes.iter().map(|gap| {
         format!(
-            "The vehicle's own record has no place {}: its program stood still, or nothing measured one.",
-            span(gap)
+            "The vehicle's own record has no place {}, for {}: its program stood still, or nothing measured one.",
+            span(gap),
+            dive.lasted(gap.1 - gap.0)
         )
     });
     let unknown = vehicle.own.runs_s.is_empty().then(|| {
@@ -122,8 +138,20 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
     idle.chain(unknown).chain(stood).chain(more).collect()
 }
 
+/// How much later than the one before a moment of a row must be to be unusually late: several times what 95 % of them take.
+pub(super) fn unusual_s(times_s: &[f64]) -> f64 {
+    const TIMES: f64 = 4.0;
+    let mut apart: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    apart.sort_by(f64::total_cmp);
+    // Of a few, the longest ones may be gaps.
+    let usual = apart.get((apart.len() * 19 / 20).min(apart.len().saturating_sub(2)));
+    usual.map_or(f64::INFINITY, |usual_s| TIMES * usual_s)
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::dive::OwnRecord;
+    use super::super::track_point::TrackPoint;
     use super::*;
 
     fn dive_of(end_s: f64, speed: f64) -> Dive {
@@ -133,30 +161,44 @@ mod tests {
     }
 
     #[test]
-    fn longer_pauses_than_usual_are_told() {
-        let dive = dive_of(100.0, 1.0);
+    fn a_silence_has_one_begin_end_and_length() {
+        let dive = dive_of(100.0, 2.0);
         let times: Vec<f64> = (0..=100).filter(|s| !(31..60).contains(s)).map(f64::from).collect();
-        let told = "72 frames; half of the time, the last one was at most 0.7 s old, with 1 longer pause: 30 s from 1970-01-01T00:00:30Z to 1970-01-01T00:01:00Z.";
-        assert_eq!(pauses(&dive, &times, dive.span_s), told);
-        let told_evenly = "30 frames; half of the time, the last one was at most 0.5 s old, the longest pause was 1 s.";
-        assert_eq!(pauses(&dive, &times[..30], (0.0, 30.0)), told_evenly);
-        let faster = dive_of(10.0, 10.0);
-        let times: Vec<f64> = times.iter().map(|s| s / 10.0).collect();
-        assert!(
-            pauses(&faster, &times, faster.span_s)
-                .starts_with("72 frames; half of the time, the last one was at most 0.1 s (0.7 s of the mission) old")
-        );
+        let mut vehicle = DiveVehicle { heard_s: times, ..DiveVehicle::default() };
+        let at_surface = "the surface heard nothing from it until 1970-01-01T00:01:00Z, for 30 s (60 s of the mission)";
+        assert_eq!(told(&dive, &vehicle), [(30.0, at_surface.to_owned())]);
+        let age = "At the surface the last frame that was heard was at most 0.7 s (1.4 s of the mission) old half of the time.";
+        assert_eq!(heard(&dive, &vehicle)[1], age);
+        vehicle.own.runs_s = vec![(0.0, 100.0)];
+        vehicle.own.heard_s = (0..=100).filter(|s| !(26..62).contains(s)).map(f64::from).collect();
+        let on_board = "; on board nothing of the surface was heard from 1970-01-01T00:00:25Z until 1970-01-01T00:01:02Z, for 37 s (74 s of the \
+                        mission)";
+        assert_eq!(told(&dive, &vehicle), [(30.0, format!("{at_surface}{on_board}"))]);
     }
 
     #[test]
     fn a_vehicle_that_was_hardly_heard_was_silent() {
         let (dive, mut vehicle) = (dive_of(100.0, 1.0), DiveVehicle::default());
         assert_eq!(heard(&dive, &vehicle), ["No frame from it was heard."]);
-        assert!(has_silence(&dive, &vehicle));
+        let begin = told(&dive, &vehicle);
+        assert_eq!(begin, [(0.0, "the surface had not heard it yet until 1970-01-01T00:01:40Z, for 100 s".to_owned())]);
         vehicle.heard_s = vec![4.0];
-        let told =
-            "The surface heard 1 frame, with 1 longer pause: 96 s from 1970-01-01T00:00:04Z to 1970-01-01T00:01:40Z.";
-        assert_eq!(heard(&dive, &vehicle)[1], told);
-        assert!(has_silence(&dive, &vehicle));
+        assert_eq!(silences(&dive, &vehicle), [(4.0, 100.0)]);
+    }
+
+    #[test]
+    fn a_place_that_comes_a_little_late_is_no_gap() {
+        let dive = dive_of(100.0, 4.0);
+        let track = |late_s: f64| {
+            let at = |n: u32| f64::from(n) * 0.5 + if n > 50 { late_s } else { 0.0 };
+            let place = |n| TrackPoint { at_s: at(n), east_m: 0.0, north_m: 0.0, depth_m: 0.0, sigma_m: 1.0 };
+            let own =
+                OwnRecord { track: (0..100).map(place).collect(), runs_s: vec![(0.0, 100.0)], ..OwnRecord::default() };
+            of_records(&dive, &DiveVehicle { own, ..DiveVehicle::default() })
+        };
+        assert!(track(0.8).is_empty(), "1.3 s where others take 0.5 s");
+        let gap = "The vehicle's own record has no place from 1970-01-01T00:00:25Z to 1970-01-01T00:00:35Z, for 11 s (42 s of the mission): its \
+                   program stood still, or nothing measured one.";
+        assert_eq!(track(10.0), [gap]);
     }
 }

@@ -3,31 +3,25 @@
 use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
-use super::words::{self, counted};
-use crate::recording::FrameCounts;
+use super::round_trip::by_round_trip;
+use super::words::counted;
+use super::{frames, gaps};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Link;
 use scenecast_surface::state::{LinkDirection, LinkSummary, VehicleState};
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 impl Dive {
     /// What became of the frames, in sentences.
     pub(super) fn link_sentences(&self, vehicle: &DiveVehicle) -> Vec<String> {
-        let mut sentences = Vec::new();
-        if vehicle.own.frames.sent + vehicle.own.frames.heard() > 0 && self.state.vehicles.len() == 1 {
-            let (own, surface) = (("vehicle", &vehicle.own.frames), ("surface", &self.frames));
-            let is_whole = vehicle.covers(self);
-            sentences.extend([(own, surface), (surface, own)].map(|(from, to)| transmitted(from, to, is_whole)));
-        }
-        sentences.extend(numbered(&self.state.link));
+        let mut sentences: Vec<String> = frames::told(&self.state.link).into_iter().collect();
         let LinkSummary { up, down, .. } = &self.state.link;
         if !vehicle.has_modem(self) {
             sentences.push("The frames did not go through a modem, so no energy is told.".to_owned());
         } else if let (Some(up_j), Some(down_j)) = (up.energy_j, down.energy_j) {
             sentences.push(format!(
-                "By modem.tx_watts of the surface and the frames that it knows of, the modems of the vehicles spent about {up_j:.0} J on transmitting, \
-                 that of the surface {down_j:.0} J."
+                "Calculated from modem.tx_watts of the surface and the frames that it knows of, the modems of the vehicles spent about {up_j:.0} J on \
+                 transmitting, that of the surface {down_j:.0} J."
             ));
         }
         sentences
@@ -36,38 +30,50 @@ impl Dive {
     /// The link and the position over time, the link over range, and what its bytes were.
     pub(super) fn link(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         let (begin, end) = self.span_s;
-        let series = |name, unit, value: fn(&Link) -> f32| Series {
+        // While nothing arrives, what the surface had last says nothing of the link.
+        let silences = gaps::silences(self, vehicle);
+        let is_silent = |at_s: f64| silences.iter().any(|gap| (gap.0..gap.1).contains(&at_s));
+        let of_link = |name, unit: &str, value: &dyn Fn(f64, &Link) -> f64| Series {
             name,
-            unit,
-            points: vehicle.link.iter().map(|(at_s, link)| (at_s - begin, f64::from(value(link)))).collect(),
+            unit: unit.to_owned(),
+            points: vehicle.link.iter().map(|(at_s, link)| (at_s - begin, value(*at_s, link))).collect(),
         };
-        let uncertainty = Series {
-            name: "uncertainty of the place on the earth (68 %, east and north each)",
-            unit: "m",
-            points: vehicle.track.iter().map(|point| (point.at_s - begin, point.sigma_m)).collect(),
+        let known = |at_s: f64, value: f32| if is_silent(at_s) { f64::NAN } else { f64::from(value) };
+        let (a_second, s) = match self.is_scaled() {
+            true => ("bit per second of the mission", "s of the clock"),
+            false => ("bit/s", "s"),
         };
         let charts = [
-            series("received from the vehicle", "bit/s", |link| link.received_bps),
-            series("sent to the vehicle", "bit/s", |link| link.sent_bps),
-            series("share of the last 64 frames lost", "%", |link| link.loss * 100.0),
-            series("data that waited at the vehicle", "bit", |link| link.backlog_bits as f32),
-            series("age of the last frame from the vehicle", "s", |link| link.age_s),
+            of_link("received from the vehicle", a_second, &|_, link| f64::from(link.received_bps)),
+            of_link("sent to the vehicle", a_second, &|_, link| f64::from(link.sent_bps)),
+            of_link("share of the last 64 frames lost", "%", &|at_s, link| known(at_s, link.loss * 100.0)),
+            of_link("data that waited at the vehicle, as it reported last", "bit", &|at_s, link| {
+                known(at_s, link.backlog_bits as f32)
+            }),
+            of_link("age of the last frame from the vehicle", s, &|_, link| {
+                f64::from(link.age_s) / self.state.mission.speed
+            }),
             Series {
                 name: "share of the cells that the vehicle had to send that the operator's map had with the same label",
-                unit: "%",
+                unit: "%".to_owned(),
                 points: vehicle.maps.iter().map(|maps| (maps.at_s - begin, maps.agreement * 100.0)).collect(),
             },
-            uncertainty,
+            Series {
+                name: "uncertainty of the place on the earth (68 %, east and north each)",
+                unit: "m".to_owned(),
+                points: vehicle.path().iter().map(|point| (point.at_s - begin, point.sigma_m)).collect(),
+            },
         ];
         let charts: Vec<String> = charts.iter().filter_map(|series| chart::line(series, begin, end - begin)).collect();
         if !charts.is_empty() {
-            let _ = writeln!(page, "<h3>Link and position over time</h3>\n<figure>{}</figure>", charts.join("\n"));
+            let _ = writeln!(
+                page,
+                "<h3>Link and position over time</h3>\n<figure>{}<figcaption>A line has a gap where a value was not known, or came far later than \
+                 usual.</figcaption></figure>",
+                charts.join("\n")
+            );
         }
-        if vehicle.has_modem(self) {
-            *page += &over_range(vehicle);
-        } else {
-            *page += "<p>The frames did not go through a modem, so their round trips tell no distance.</p>\n";
-        }
+        *page += &by_round_trip(self, vehicle);
         self.frames_and_bytes(page, state, vehicle);
     }
 
@@ -79,7 +85,7 @@ impl Dive {
         vehicle: &DiveVehicle,
         [up, down]: [(&str, &LinkDirection); 2],
     ) {
-        *page += "<table><thead><tr><th>direction</th><th>frames</th><th>lost</th><th>bytes</th><th>mean rate</th><th>fullest \
+        *page += "<table><thead><tr><th>direction</th><th>bytes</th><th>mean rate</th><th>fullest \
                   minute</th><th>budget of the sender</th></tr></thead>";
         let of_surface = told_budgets(&budgets(vehicle.link.iter().map(|(at_s, link)| (*at_s, link))));
         let reported = state.status.as_ref().map(|status| format!("{} bit/s by its last report", status.budget_bps));
@@ -99,24 +105,17 @@ impl Dive {
             let bytes: u64 = direction.bytes_by_class.values().sum();
             let _ = write!(
                 page,
-                "<tr><td>{name}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{bytes}</td><td class=\"n\">{:.0} bit/s</td>\
+                "<tr><td>{name}</td><td class=\"n\">{bytes}</td><td class=\"n\">{:.0} bit/s</td>\
                  <td class=\"n\">{fullest}</td><td>{}</td></tr>",
-                direction.frames,
-                direction.loss * 100.0,
                 bytes as f64 * 8.0 / self.surface_ran_s().max(1.0),
                 budget.as_deref().unwrap_or("not known")
             );
         }
         let _ = writeln!(
             page,
-            "</table>\n<p>The surface counted these, copies of a frame once. Frames from the vehicles are lost if the surface never accepted their \
-             numbers, and frames to them if the vehicles did not acknowledge them.{} Bytes and rates from the vehicles are those \
-             that were heard, the others those that were sent. The mean is that of the bytes of frames over the time in which the surface \
-             ran; the fullest minute and the budget count bits on air, with what the modem adds to each frame and with copies.</p>",
-            match self.frames.unused() {
-                0 => String::new(),
-                _ => format!(" Counted one by one, copies too: at the surface, {}.", words::unused(&self.frames)),
-            }
+            "</table>\n<p>Bytes and rates from the vehicles are those that were heard, the others those that were sent, by the surface. The mean \
+             is that of the bytes of frames over the time in which the surface ran; the fullest minute and the budget count bits on air, with \
+             what the modem adds to each frame and with copies.</p>"
         );
     }
 
@@ -129,6 +128,7 @@ impl Dive {
     /// What became of the frames, and what the bytes of each class brought.
     fn frames_and_bytes(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         let directions = [("from the vehicles", &self.state.link.up), ("to the vehicles", &self.state.link.down)];
+        *page += &frames::table(self, vehicle);
         self.directions(page, state, vehicle, directions);
         let has_own = !vehicle.own.sent_bits.is_empty() && self.vehicles.len() == 1;
         let own_title = if has_own { "<th>sent on board, copies not counted</th>" } else { "" };
@@ -199,43 +199,6 @@ impl Dive {
     }
 }
 
-/// The frames of one direction by the records of both ends.
-fn transmitted((sender, from): (&str, &FrameCounts), (hearer, to): (&str, &FrameCounts), is_whole: bool) -> String {
-    let lost = match from.sent.saturating_sub(to.heard()) {
-        _ if from.sent == to.heard() => String::new(),
-        0 if is_whole => String::new(),
-        _ if !is_whole => ", by records that do not cover the same time".to_owned(),
-        lost => format!(" ({:.1} % lost on the way)", lost as f64 / from.sent.max(1) as f64 * 100.0),
-    };
-    let (sent, heard) = (from.sent, to.heard());
-    format!(
-        "Counted by both records, each copy by itself: the {sender} transmitted {sent} frames, and the {hearer} heard {heard}{lost}; {}.",
-        words::unused(to)
-    )
-}
-
-/// What the numbers of the frames say; `None` if nothing came from the vehicles.
-fn numbered(LinkSummary { up, down, .. }: &LinkSummary) -> Option<String> {
-    let lost = |direction: &LinkDirection, none: &str, some: &str| match direction.lost {
-        0 => none.to_owned(),
-        lost => format!("{some}{lost} ({:.1} %)", direction.loss * 100.0),
-    };
-    let again = match up.lost + down.lost {
-        0 => "",
-        _ => "; what missed frames held of the map and of orders was sent again",
-    };
-    (up.frames > 0).then(|| {
-        format!(
-            "Counted by the surface alone, copies of a frame once: it missed {} of the {} frames from the vehicles (those that came \
-             in damaged are missed too), and the vehicles acknowledged {} of the {} frames to them{again}.",
-            lost(up, "none", ""),
-            up.frames,
-            lost(down, "all", "all but "),
-            down.frames
-        )
-    })
-}
-
 /// The budgets of the end that recorded these, and since when each was in force.
 pub(super) fn budgets<'a>(links: impl Iterator<Item = (f64, &'a Link)>) -> Vec<(f64, u32)> {
     let mut steps: Vec<(f64, u32)> = links.map(|(at_s, link)| (at_s, link.budget_bps)).collect();
@@ -257,64 +220,9 @@ fn sum_of_layer(dive: &Dive, layer: &str) -> usize {
     dive.vehicles().map(|(_, vehicle)| vehicle.layer_cells.get(layer).copied().unwrap_or_default()).sum()
 }
 
-/// The quality of the link by the distance of the vehicle, which the round trips tell; empty where they are not known.
-fn over_range(vehicle: &DiveVehicle) -> String {
-    const SOUND_M_S: f64 = 1500.0;
-    let known = vehicle.link.iter().filter(|(_, link)| link.round_trip_s > 0.0);
-    let known: Vec<(f64, &Link)> =
-        known.map(|(_, link)| (f64::from(link.round_trip_s) / 2.0 * SOUND_M_S, link)).collect();
-    let Some(farthest_m) = known.iter().map(|(range_m, _)| *range_m).reduce(f64::max) else {
-        return "<p>No round trip was measured, so the distance of the vehicle is not known.</p>\n".to_owned();
-    };
-    let step_m = chart::round_length(farthest_m / 4.0).max(10.0);
-    let mut bins: BTreeMap<u64, Vec<&Link>> = BTreeMap::new();
-    known.into_iter().for_each(|(range_m, link)| bins.entry((range_m / step_m) as u64).or_default().push(link));
-    let mut table = "<h3>Link over range</h3>\n<table><tr><th>half of the round trip</th><th>moments</th><th>frames lost</th><th>received from it</th></tr>".to_owned();
-    for (bin, links) in bins {
-        let mean = |value: fn(&Link) -> f32| {
-            let values: Vec<f64> =
-                links.iter().map(|link| f64::from(value(link))).filter(|value| value.is_finite()).collect();
-            values.iter().sum::<f64>() / values.len().max(1) as f64
-        };
-        let _ = write!(
-            table,
-            "<tr><td>{:.0} to {:.0} m</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{:.0} bit/s</td></tr>",
-            bin as f64 * step_m,
-            (bin + 1) as f64 * step_m,
-            links.len(),
-            mean(|link| link.loss) * 100.0,
-            mean(|link| link.received_bps)
-        );
-    }
-    table
-        + "</table>\n<p>Each moment is one of every ten seconds. Half of the round trip is told as a distance at 1500 m/s; the vehicle was nearer than that, \
-             as the time that modems and serial lines take is in it. The share lost is that of the last 64 frames, or of all so far while there \
-             are fewer.</p>\n"
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_loss_says_who_counted_it() {
-        let counts = |sent, received| FrameCounts { sent, received, ..FrameCounts::default() };
-        let told = |is_whole| transmitted(("vehicle", &counts(100, 0)), ("surface", &counts(0, 75)), is_whole);
-        let begin = "Counted by both records, each copy by itself: the vehicle transmitted 100 frames, and the surface heard 75";
-        assert_eq!(told(true), format!("{begin} (25.0 % lost on the way); all that arrived were used."));
-        assert_eq!(
-            told(false),
-            format!("{begin}, by records that do not cover the same time; all that arrived were used.")
-        );
-        let mut link = LinkSummary::default();
-        assert_eq!(numbered(&link), None);
-        (link.up, link.down) = (
-            LinkDirection { frames: 50, ..LinkDirection::default() },
-            LinkDirection { frames: 40, lost: 4, loss: 0.1, ..LinkDirection::default() },
-        );
-        let told = numbered(&link).unwrap();
-        assert!(told.contains("missed none of the 50") && told.contains("all but 4 (10.0 %) of the 40"), "{told}");
-    }
 
     #[test]
     fn rates_of_the_link_stand_beside_the_budget() {

@@ -22,9 +22,7 @@ pub(super) fn events(recording: &Recording, is_scaled: bool) -> Vec<(f64, Event)
     };
     let mut events: Vec<(f64, Event)> =
         recording.log.iter().map(|(at, event)| (happened(*at, event), event.clone())).collect();
-    if is_scaled {
-        events.iter_mut().for_each(|(_, event)| name_mission_time(event));
-    }
+    events.iter_mut().for_each(|(_, event)| name_mission_time(event, is_scaled));
     let unnamed = LabelBook::default();
     for (part, known) in &recording.vehicles {
         let given = recording.operator.get(part).into_iter().flat_map(|known| &known.given);
@@ -52,10 +50,15 @@ pub(super) fn events(recording: &Recording, is_scaled: bool) -> Vec<(f64, Event)
     events
 }
 
-/// Says of the times in an event about silence that they are the mission's.
-fn name_mission_time(event: &mut Event) {
-    let is_time = ["silent for ", "received again after "].iter().any(|begin| event.text.starts_with(begin));
-    if event.source == LogKind::Contact.name() && is_time {
+/// Says of the time in an event about silence that it is the mission's, and leaves the length of one that is over to the report, which
+/// has it by the frames.
+fn name_mission_time(event: &mut Event, is_scaled: bool) {
+    if event.source != LogKind::Contact.name() {
+        return;
+    }
+    if event.text.starts_with("received again after ") {
+        event.text = "received again".to_owned();
+    } else if is_scaled && event.text.starts_with("silent for ") {
         event.text += " of the mission";
     }
 }
@@ -81,11 +84,12 @@ mod tests {
     fn times_of_silence_are_named_as_the_missions() {
         let named = |source: &str, text: &str| {
             let mut event = Event { source: source.to_owned(), text: text.to_owned(), ..Event::default() };
-            name_mission_time(&mut event);
+            name_mission_time(&mut event, true);
             event.text
         };
         assert_eq!(named("contact", "silent for 1 min 0 s"), "silent for 1 min 0 s of the mission");
         assert_eq!(named("contact", "received"), "received");
+        assert_eq!(named("contact", "received again after 1 min 28 s"), "received again");
         assert_eq!(named("record", "silent for 1 min 0 s"), "silent for 1 min 0 s");
     }
 }

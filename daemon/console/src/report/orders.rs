@@ -4,11 +4,10 @@ use super::dive::{Dive, DiveVehicle};
 use super::order_step::{OrderKey, OrderStep};
 use super::{Escaped, unix_s, words};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::OrderStatus;
+use scenecast_messages::scenecast_msgs::{Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
-use scenecast_surface::state::{InForceKnowledge, VehicleState};
+use scenecast_surface::state::VehicleState;
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The longest content of an order that is told whole, bytes.
@@ -76,13 +75,26 @@ impl DiveVehicle {
     }
 
     /// The labels of which an order asks for images.
-    fn labels_of_images(&self, order: &OrderKey) -> Option<Vec<u64>> {
+    pub(super) fn labels_of_images(&self, order: &OrderKey) -> Option<Vec<u64>> {
         let content: Value = serde_json::from_str(&self.given.get(order)?.content).ok()?;
         content.get("labels")?.as_array().map(|labels| labels.iter().filter_map(Value::as_u64).collect())
     }
 
+    /// An order of the budget without what the one before it said too; any other order as it is.
+    fn changed(&self, (slot, version): &OrderKey, given: &Order) -> Order {
+        let members = |order: &Order| serde_json::from_str::<serde_json::Map<String, Value>>(&order.content).ok();
+        let before = self.given.range((slot.clone(), 0)..(slot.clone(), *version)).next_back();
+        let before = before.filter(|_| slot == SlotId::Budget.name()).and_then(|(_, before)| members(before));
+        let Some((before, mut now)) = before.zip(members(given)) else { return given.clone() };
+        now.retain(|name, value| before.get(name) != Some(value));
+        match now.is_empty() {
+            true => given.clone(),
+            false => Order { content: Value::Object(now).to_string(), ..given.clone() },
+        }
+    }
+
     /// What such an order says, in words.
-    fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
+    pub(super) fn content(&self, state: &VehicleState, order @ (slot, version): &OrderKey) -> Option<String> {
         let given = self.given.get(order)?;
         let labels = |version: &u32| self.labels_of_images(&(slot.clone(), *version));
         // An order of images has all that are awaited.
@@ -100,7 +112,7 @@ impl DiveVehicle {
                 (false, false) => format!("images of {}, beside those of {}", named(new), named(awaited)),
             }
         });
-        Some(of_images.unwrap_or_else(|| words::content(&state.label_book, given)))
+        Some(of_images.unwrap_or_else(|| words::content(&state.label_book, &self.changed(order, given))))
     }
 }
 
@@ -118,6 +130,10 @@ impl Dive {
         });
         let nearest = logged.filter(|(away_s, ..)| *away_s < 0.5).min_by(|a, b| a.0.total_cmp(&b.0));
         let (by, words) = nearest.map_or((String::new(), content.clone()), |(_, by, words)| (by, words));
+        let content = match self.is_of_larger(state, given) {
+            true => content.replacen("images of", "a larger image of", 1),
+            false => content,
+        };
         // The log has places in a few words.
         let words = if content.len() > MAX_CONTENT { words } else { content };
         let by = match (given.principal.is_empty(), by.is_empty()) {
@@ -128,12 +144,21 @@ impl Dive {
         (words::author(&by).to_owned(), words)
     }
 
+    /// Whether an order asks for a larger version of an image, which the log alone says.
+    pub(super) fn is_of_larger(&self, state: &VehicleState, given: &Order) -> bool {
+        let is_it = |words: &str| words.starts_with("larger image requested: ");
+        let is_near = |at_s: f64| (at_s - unix_s(&given.header.stamp)).abs() < 0.5;
+        let of_it = self.events.iter().filter(|(at_s, event)| is_near(*at_s) && event.vehicle == state.name);
+        given.slot == SlotId::Requests.name()
+            && of_it.into_iter().any(|(_, event)| event.source == "order" && said(&event.text, is_it).is_some())
+    }
+
     /// The orders with their ends, the first one first.
     pub(super) fn orders_table(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
         if vehicle.orders_of_people().next().is_none() {
             return;
         }
-        *page += "<h3>Orders</h3>\n<table><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>decided on board after</th><th>known at the surface after</th></tr></thead>\n";
+        *page += "<h3>Orders</h3>\n<table class=\"wide\"><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>decided on board after</th><th>known at the surface after</th></tr></thead>\n";
         let mut orders: Vec<(&OrderKey, &OrderStep)> =
             vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.last()?))).collect();
         orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));
@@ -146,7 +171,7 @@ impl Dive {
             let end = end.map_or_else(|| last.told(), |by| format!("{}; {by}", last.told()));
             let _ = writeln!(
                 page,
-                "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td class=\"n\">{on_board}</td><td class=\"n\">{known}</td></tr>",
+                "<tr><td>{}</td><td class=\"o\">{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td>{on_board}</td><td>{known}</td></tr>",
                 Escaped(words::order(slot, &ordered)),
                 Escaped(&ordered),
                 Escaped(&by),
@@ -155,79 +180,6 @@ impl Dive {
             );
         }
         *page += "</table>\n";
-    }
-
-    /// The orders that were in force at the end, beside what was configured.
-    pub(super) fn in_force(&self, page: &mut String, state: &VehicleState, vehicle: &DiveVehicle) {
-        let passing = [SlotId::Requests.name(), SlotId::Fix.name()];
-        let mut last: BTreeMap<&str, (&OrderKey, &OrderStep)> = BTreeMap::new();
-        for (order, way) in vehicle.orders_of_people().filter(|((slot, _), _)| !passing.contains(&slot.as_str())) {
-            if let Some(applied) = way.iter().rev().find(|step| step.status == OrderStatus::APPLIED) {
-                last.insert(order.0.as_str(), (order, applied));
-            }
-        }
-        let is_aborted = last
-            .get(SlotId::Constraints.name())
-            .is_some_and(|(order, _)| vehicle.content(state, order).is_some_and(|content| content == "abort"));
-        last.retain(|slot, (order, _)| {
-            let is_over = state.orders.in_force.get(*slot) == Some(&InForceKnowledge::None);
-            !is_over && vehicle.content(state, order).is_none_or(|content| content != "resume")
-        });
-        let mut last: Vec<_> = last.into_iter().collect();
-        last.sort_by(|a, b| a.1.1.given_s.total_cmp(&b.1.1.given_s));
-        let rows: String = last
-            .into_iter()
-            .map(|(slot, (order, step))| {
-                let (by, mut ordered) = self.ordered(state, vehicle, order);
-                let given = utc_text(step.given_s);
-                let kind = Escaped(words::order(slot, &ordered)).to_string();
-                if is_aborted && slot == SlotId::Destination.name() {
-                    ordered += "; the abort ended it";
-                }
-                let (ordered, by) = (Escaped(&ordered).to_string(), Escaped(&by).to_string());
-                format!("<tr><td>{kind}</td><td>{ordered}</td><td class=\"t\">{given}</td><td>{by}</td></tr>\n")
-            })
-            .collect();
-        let budget = state.status.as_ref().map_or_else(String::new, |status| {
-            format!(
-                " The vehicle kept to a budget of {} bit/s then, the surface to {}.",
-                status.budget_bps, self.state.link.budget_bps
-            )
-        });
-        *page += "<h3>In force at the end</h3>\n";
-        *page += &match rows.is_empty() {
-            true => format!("<p>No order was in force: all was as configured.{budget}</p>\n"),
-            false => format!(
-                "<p>The last order of each kind that the vehicle applied; all else was as configured.{budget}</p>\n<table><thead><tr><th>kind</th>\
-                 <th>what was ordered</th><th>given (UTC)</th><th>by</th></tr></thead>\n{rows}</table>\n"
-            ),
-        };
-        *page += &self.awaited_images(state, vehicle);
-    }
-
-    /// The images that the last order of them asked for and that have not arrived, in a paragraph.
-    fn awaited_images(&self, state: &VehicleState, vehicle: &DiveVehicle) -> String {
-        let slot = SlotId::Requests.name();
-        let last = vehicle
-            .orders_of_people()
-            .filter(|((of, _), _)| of == slot)
-            .filter_map(|(order, way)| Some((order, way.last()?)));
-        let Some((order, last)) = last.max_by_key(|((_, version), _)| *version) else { return String::new() };
-        let has_come =
-            |label: &u8| vehicle.exemplars.iter().any(|(at_s, image)| image.label == *label && *at_s >= last.given_s);
-        let awaited: Vec<String> = (vehicle.labels_of_images(order).into_iter().flatten())
-            .filter_map(|label| u8::try_from(label).ok())
-            .filter(|label| !has_come(label))
-            .map(|label| words::label(&state.label_book, label))
-            .collect();
-        if awaited.is_empty() || last.status == OrderStatus::REFUSED || last.status == OrderStatus::WITHDRAWN {
-            return String::new();
-        }
-        format!(
-            "<p>Asked for at {} and not arrived since: images of {}.</p>\n",
-            utc_text(last.given_s),
-            Escaped(&awaited.join(", "))
-        )
     }
 
     /// What the vehicle was steered by over time, and its modes.
@@ -283,7 +235,7 @@ pub(super) fn said(text: &str, is_it: impl Fn(&str) -> bool) -> Option<(String, 
 mod tests {
     use super::*;
     use scenecast_messages::builtin_interfaces::Time;
-    use scenecast_messages::scenecast_msgs::{Event, Order};
+    use scenecast_messages::scenecast_msgs::Event;
 
     fn status(version: u32, status: u8, s: i64) -> OrderStatus {
         let mut message = OrderStatus { slot: "fence".into(), version, status, ..OrderStatus::default() };

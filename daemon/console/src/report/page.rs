@@ -1,27 +1,22 @@
 //! The page of a report.
 
 use super::areas::ClassArea;
-use super::chart;
 use super::dive::{Dive, DiveVehicle};
 use super::orders::said;
-use super::{Escaped, doubts, extent, summary, words};
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
+use super::{Escaped, doubts, extent, images, map_figure, summary, words};
 use scenecast_core::utc_text;
 use scenecast_files::RecordFile;
-use scenecast_messages::scenecast_msgs::{Event, Exemplar};
+use scenecast_messages::scenecast_msgs::Event;
 use scenecast_surface::state::VehicleState;
 use scenecast_surface::{LabelBook, LogKind};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::sync::LazyLock;
 
-/// Images of a label in the report.
-const IMAGES: usize = 3;
-
-const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:800px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
+const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
 table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;vertical-align:top;padding:.25em .6em;\
-border-bottom:1px solid #ccc}td.n{text-align:right;white-space:nowrap}td.t{white-space:nowrap}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
+border-bottom:1px solid #ccc}p,li{max-width:50em}td.n{text-align:right;white-space:nowrap}td.t{white-space:nowrap}td.o{min-width:15em}.wide{font-size:.8em}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
 svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.area{fill:none;stroke:#000;stroke-dasharray:1 4}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
@@ -61,6 +56,8 @@ impl Dive {
         let recorded = if self.settings.program.is_empty() { "an earlier scenecast" } else { &self.settings.program };
         let names: Vec<&str> = self.state.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
         let program = Escaped(scenecast_core::program());
+        let reported =
+            if recorded == scenecast_core::program() { String::new() } else { format!(", report by {program}") };
         let made_up: BTreeSet<String> = self.vehicles().filter_map(|(_, vehicle)| vehicle.made_up(self)).collect();
         let is_known = self.vehicles().all(|(_, vehicle)| !vehicle.own.settings.program.is_empty());
         let made_up: String = match made_up.is_empty() && !is_known {
@@ -75,7 +72,7 @@ impl Dive {
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, which {} wrote from {begin} to {end}. \
              The map is the operator's: what had arrived over the link. Areas are counts of cells. Names of classes are those at the end.</p>\n{}<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
-             sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}, report by {program}.</p>\n</body></html>",
+             sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}{reported}.</p>\n</body></html>",
             Escaped(recorded),
             self.files_table(),
             Escaped(&names.join(", ")),
@@ -108,11 +105,11 @@ impl Dive {
             let _ = writeln!(page, "<h3>{title}</h3>\n<ul>\n{items}</ul>");
         }
         let area = extent::of_survey(self, vehicle);
-        if let Some(map) = chart::map(state, vehicle, area) {
+        if let Some(map) = map_figure::map(state, vehicle, area) {
             let _ = writeln!(
                 page,
                 "<figure class=\"map\">{map}<figcaption><div class=\"legend\">{}</div>The operator's map at the end, each class with its number, and the \
-                 track of the vehicle: {}. {}{}Metres east and \
+                 track of the vehicle: {}. Squares: places of images. {}{}Metres east and \
                  north of the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
                 legend(state, vehicle),
                 match vehicle.own.track.len() {
@@ -140,8 +137,9 @@ impl Dive {
             event.source == LogKind::Record.name() && said(&event.text, |words| words.starts_with("label ")).is_some()
         };
         let rows = self.events.iter().filter(|(_, event)| is_change(event)).map(|(at_s, event)| {
-            let (vehicle, text) = (Escaped(&event.vehicle), Escaped(&event.text));
-            format!("<tr><td class=\"t\">{}</td><td class=\"t\">{vehicle}</td><td>{text}</td></tr>\n", utc_text(*at_s))
+            let (vehicle, told) = (Escaped(&event.vehicle), words::event(self.book(&event.vehicle), event));
+            let (at, told) = (utc_text(*at_s), Escaped(&told));
+            format!("<tr><td class=\"t\">{at}</td><td class=\"t\">{vehicle}</td><td>{told}</td></tr>\n")
         });
         let rows: String = rows.collect();
         if !rows.is_empty() {
@@ -151,15 +149,17 @@ impl Dive {
         }
     }
 
+    /// What the labels of a vehicle are called.
+    fn book(&self, vehicle: &str) -> &LabelBook {
+        static UNNAMED: LazyLock<LabelBook> = LazyLock::new(LabelBook::default);
+        let state = self.state.vehicles.iter().find(|state| state.name == vehicle);
+        state.map_or(&UNNAMED, |state| &state.label_book)
+    }
+
     fn events_table(&self, page: &mut String) {
         if self.events.is_empty() {
             return;
         }
-        let unnamed = LabelBook::default();
-        let book = |vehicle: &str| {
-            let state = self.state.vehicles.iter().find(|state| state.name == vehicle);
-            state.map_or(&unnamed, |state| &state.label_book)
-        };
         *page += "<h2>Events</h2>\n<table><thead><tr><th>time (UTC)</th><th>vehicle</th><th>kind</th><th>event</th></tr></thead>\n";
         for (at_s, event) in &self.events {
             let _ = writeln!(
@@ -168,7 +168,7 @@ impl Dive {
                 utc_text(*at_s),
                 Escaped(&event.vehicle),
                 Escaped(words::kind(&event.source)),
-                Escaped(&words::event(book(&event.vehicle), event))
+                Escaped(&words::event(self.book(&event.vehicle), event))
             );
         }
         *page += "</table>\n";
@@ -255,59 +255,8 @@ fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveV
         );
     }
     let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.classes));
-    pictures(page, dive, state, vehicle);
-    without_cells(page, dive, state, vehicle);
-}
-
-/// The images of the classes, and which have none.
-fn pictures(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
-    let images: Vec<(u8, String)> =
-        vehicle.classes.iter().map(|class| (class.label, images(dive, state, vehicle, class.label))).collect();
-    let all: String = images.iter().map(|(_, images)| images.as_str()).collect();
-    let bare = images.iter().filter(|(_, images)| images.is_empty());
-    let bare = bare.map(|(class, _)| words::label(&state.label_book, *class));
-    let bare: Vec<String> = bare.collect();
-    if !all.is_empty() {
-        let sigma = match all.contains('\u{b1}') {
-            true => {
-                "<p>\u{b1}: the uncertainty of the vehicle's place on the earth when the image was taken (68 %, east and north each).</p>\n"
-            }
-            false => "",
-        };
-        let _ = writeln!(page, "<h3>Images of the classes</h3>\n{sigma}<div class=\"images\">{all}</div>");
-    }
-    if !bare.is_empty() {
-        let _ = writeln!(page, "<p>Classes of which no image was received: {}.</p>", Escaped(&bare.join(", ")));
-    }
-}
-
-/// The labels that have a name or images, and no cell at the end.
-fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
-    let book = &state.label_book;
-    let has_cells = |label: u8| vehicle.classes.iter().any(|class| class.label == book.shown_as(label));
-    let named = book.iter().filter(|(_, entry)| entry.name.is_some()).map(|(label, _)| *label);
-    let pictured = vehicle.exemplars.iter().map(|(_, exemplar)| exemplar.label);
-    let had = vehicle.had.iter().copied();
-    let never: Vec<String> = named
-        .filter(|label| !has_cells(*label) && !vehicle.had.contains(label))
-        .map(|label| words::label(book, label))
-        .collect();
-    if !never.is_empty() {
-        let _ = writeln!(page, "<p>People named labels that the map never had: {}.</p>", Escaped(&never.join(", ")));
-    }
-    let labels: BTreeSet<u8> = pictured.chain(had).filter(|label| !has_cells(*label)).collect();
-    if labels.is_empty() {
-        return;
-    }
-    let images = vehicle.exemplars.iter().filter(|(_, exemplar)| labels.contains(&exemplar.label));
-    let images: String = images.map(|found| image(dive, state, vehicle, found, "")).collect();
-    let titles: Vec<String> = labels.iter().map(|label| words::label(book, *label)).collect();
-    let _ = writeln!(
-        page,
-        "<h3>Labels without cells at the end</h3>\n<p>The scene model had these labels for some time; it gave their cells to others: \
-         {}.</p>\n<div class=\"images\">{images}</div>",
-        Escaped(&titles.join(", "))
-    );
+    images::of_classes(page, dive, state, vehicle);
+    images::without_cells(page, dive, state, vehicle);
 }
 
 /// The classes by their colours and numbers.
@@ -318,63 +267,6 @@ fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
         format!("<span>{swatch}{}</span> ", Escaped(&title))
     };
     vehicle.classes.iter().map(entry).collect()
-}
-
-/// The largest images of a class, each with its label, time, place and scale.
-fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
-    let of_class = |label: u8| state.label_book.shown_as(label) == class;
-    // The label of a place may have changed since its image was sent.
-    let shows_it = |exemplar: &Exemplar| vehicle.shows_class(state, exemplar);
-    let of_it: Vec<_> = vehicle.exemplars.iter().filter(|(_, exemplar)| of_class(exemplar.label)).collect();
-    let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
-    found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
-    // Beside them those that the vehicle sent for the class.
-    found.extend(of_it.iter().copied().filter(|(_, exemplar)| !shows_it(exemplar)));
-    let note = |exemplar: &Exemplar| match shows_it(exemplar) {
-        true => String::new(),
-        false => "; by the map at the end its place has another class".to_owned(),
-    };
-    let more = found.len().saturating_sub(IMAGES);
-    let more = if more == 0 { String::new() } else { format!("; {more} more of this class came in") };
-    found.truncate(IMAGES);
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let shown = found.iter().enumerate();
-    shown
-        .map(|(n, found)| image(dive, state, vehicle, found, &(note(&found.1) + if n == 0 { &more } else { "" })))
-        .collect()
-}
-
-/// An image with its label, time, place and scale.
-fn image(
-    dive: &Dive,
-    state: &VehicleState,
-    vehicle: &DiveVehicle,
-    (at_s, exemplar): &(f64, Exemplar),
-    note: &str,
-) -> String {
-    let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
-    let taken = words::taken(exemplar).unwrap_or_else(|| format!("received {}", utc_text(*at_s)));
-    let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
-    let class = state.label_book.shown_as(exemplar.label);
-    let own = words::label(&state.label_book, exemplar.label);
-    let title = match class == exemplar.label {
-        true => own,
-        false => format!("{}, shown as {}", own, words::label(&state.label_book, class)),
-    };
-    let place = || {
-        let sigma = vehicle.sigma_m(super::unix_s(&exemplar.taken)).filter(|_| vehicle.measures_sigma());
-        let sigma = sigma.map_or_else(String::new, |m| format!(", \u{b1} {m:.1} m"));
-        let on_earth = words::on_earth(dive, (middle.x, middle.y));
-        format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))
-    };
-    format!(
-        "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>{}<br>{taken}{}{note}</figcaption></figure>",
-        BASE64_STANDARD.encode(&exemplar.data),
-        if is_placed { chart::scale_of_image(exemplar.width_m) } else { String::new() },
-        Escaped(&title),
-        if is_placed { place() } else { String::new() },
-        label = exemplar.label
-    )
 }
 
 fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {

@@ -44,7 +44,9 @@ impl SetBack {
     pub(super) fn told(&self, dive: &Dive) -> String {
         match (self.cells, self.kept) {
             (0, _) => String::new(),
-            (cells, kept) if kept == cells => ", with the whole map that it had before".to_owned(),
+            (cells, kept) if kept == cells => {
+                ", with the whole map of its record, which may lack the last seconds before".to_owned()
+            }
             (cells, kept) => format!(
                 ", with {kept} of the {cells} cells of its map as before: on board, changes up to {} old were lost",
                 dive.mission_lasted(self.lost_s)
@@ -88,7 +90,10 @@ mod tests {
         assert_eq!(set_back(&[(0, 1), (1, 1), (2, 1)]), SetBack { cells: 4, kept: 2, lost_s: 30.0 });
         let late = told(&[(0, 2), (1, 1), (2, 1)]);
         assert!(late.contains("3 of the 4 cells") && late.contains("changes up to 10 s old"), "{late}");
-        assert_eq!(told(&[(0, 2), (1, 1), (2, 1), (3, 4)]), ", with the whole map that it had before");
+        assert_eq!(
+            told(&[(0, 2), (1, 1), (2, 1), (3, 4)]),
+            ", with the whole map of its record, which may lack the last seconds before"
+        );
         assert!(told(&[(9, 1)]).contains("with 0 of the 4 cells"), "{}", told(&[(9, 1)]));
     }
 }

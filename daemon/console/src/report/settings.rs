@@ -38,10 +38,9 @@ impl SettingsRecord {
         }
         let _ = write!(
             page,
-            "<h2>Settings of {}</h2>\n<p>{}: those of the configuration that differ from their defaults, without files, folders, devices and \
+            "<h2>Settings of {}</h2>\n<p>Those of the configuration that differ from their defaults, without files, folders, devices and \
              addresses of the computer.</p>\n<table>",
-            Escaped(end),
-            Escaped(&self.program)
+            Escaped(end)
         );
         for (key, value) in self.told() {
             let _ = write!(page, "<tr><td>{}</td><td>{}</td></tr>", Escaped(key), Escaped(&value.to_string()));
@@ -61,7 +60,11 @@ fn told(key: &str, value: &Value) -> Option<Value> {
     match kind {
         _ if is_port => None,
         "" => (!text.contains(['/', '\\'])).then(|| value.clone()),
-        // As in "frames:FOLDER".
+        // As in "frames:FOLDER": what was played back is told by its last name.
+        "frames" | "bag" | "tum" if key == "camera.source" => {
+            let name = rest.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
+            Some(format!("{kind}:.../{name}").into())
+        }
         kind => Some(format!("{kind}:...").into()),
     }
 }
@@ -80,7 +83,7 @@ mod tests {
         let record: SettingsRecord = serde_json::from_value(settings).unwrap();
         let told: Vec<String> = record.told().iter().map(|(key, value)| format!("{key} {value}")).collect();
         let expected =
-            ["camera.source \"frames:...\"", "link.budget_bps 4000", "modem.kind \"udp\"", "vehicle.name \"a/b: c\""];
+            ["camera.source \"frames:.../C\"", "link.budget_bps 4000", "modem.kind \"udp\"", "vehicle.name \"a/b: c\""];
         assert_eq!(told, expected);
     }
 }

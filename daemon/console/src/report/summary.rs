@@ -3,22 +3,17 @@
 use super::dive::{Dive, DiveVehicle};
 use super::maps::MapsAt;
 use super::order_step::OrderStep;
-use super::words::{self, area, counted, interval, on_earth};
-use super::{extent, gaps, trouble};
+use super::words::{self, area, counted, interval};
+use super::{extent, gaps, trouble, way};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
-use scenecast_protocol::directive::{PlannerKind, SlotId};
+use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
 use scenecast_surface::LogKind;
 use scenecast_surface::state::VehicleState;
 use serde_json::Value;
 use std::collections::BTreeMap;
-
-/// A shorter jump is not told, metres.
-const LEAST_JUMP_M: f64 = 2.0;
-/// Jumps that are told one by one.
-const MAX_JUMPS: usize = 4;
 
 /// A heading, and the sentences below it.
 pub(super) type Part = (&'static str, Vec<String>);
@@ -28,7 +23,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     let dates = (dive.settings.is_rehearsal() && utc_text(dive.span_s.0).starts_with("2000-01-01"))
         .then(|| "Its dates mean nothing: a rehearsal in virtual time begins on 2000-01-01.".to_owned());
     let made_up = vehicle.made_up(dive).map(|what| format!("This was {what}."));
-    let way = [when(dive, state, vehicle), place(dive, state, vehicle), equipment(dive, vehicle)];
+    let way = [when(dive, state, vehicle), way::place(dive, state, vehicle), way::equipment(dive, vehicle)];
     let alone = is_coarse(vehicle).then(|| alone(vehicle));
     let surveyed = surveyed(dive, state, vehicle);
     let map = [
@@ -42,6 +37,7 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     let mut sent = vec![orders(dive, state, vehicle)];
     sent.extend(dive.link_sentences(vehicle));
     sent.extend(gaps::heard(dive, vehicle));
+    sent.extend(trouble::modes(dive, state, vehicle));
     vec![
         ("Where and when", made_up.into_iter().chain(dates).chain(way).collect()),
         ("What was found", map.into_iter().flatten().collect()),
@@ -117,7 +113,8 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let (begin, end) = dive.span_s;
     let speed = match dive.is_scaled() {
         true => format!(
-            ", as the mission was played {} times as fast as real time (times are those of the clock; speeds and rates are those of the mission)",
+            ", as it was played {} times as fast as real time: times are those of the clock, with those of the mission in brackets, and speeds and \
+             rates are those of the mission",
             dive.state.mission.speed
         ),
         false => String::new(),
@@ -162,8 +159,11 @@ fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Opti
     };
     (reported > 0).then(|| {
         format!(
-            "In its last report, {} before the end of the record, the vehicle had {reported} cells; {held} had arrived by the end{}.{coarse}",
-            dive.lasted(before_end_s),
+            "In its last report{}, the vehicle had {reported} cells; {held} had arrived by the end{}.{coarse}",
+            match before_end_s < 1.0 {
+                true => String::new(),
+                false => format!(", {} before the end of the record", dive.lasted(before_end_s)),
+            },
             match held > reported {
                 true => ", as it mapped and sent more after that".to_owned(),
                 false => format!(", {share:.0} %"),
@@ -190,132 +190,6 @@ fn is_coarse(vehicle: &DiveVehicle) -> bool {
     let last = ordered.max_by_key(|(version, _)| *version).map(|(_, cells)| cells).filter(|cells| !cells.is_null());
     let configured = || vehicle.own.settings.settings.get("map.cells").cloned();
     last.or_else(configured).is_some_and(|cells| cells == "coarse")
-}
-
-/// How the vehicle looked at the sea floor.
-fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
-    if !dive.knows_settings(vehicle) {
-        return "What the vehicle was set to, such as its altitude, speed and camera, and whether its motion and its images were real, is not \
-                known without its own record."
-            .to_owned();
-    }
-    let all = dive.ran_with(vehicle);
-    let set = |key: &str, default: f64| all.settings.get(key).and_then(Value::as_f64).unwrap_or(default);
-    let defaults = scenecast_config::Config::default();
-    if vehicle.is_played_back() {
-        return "What was played back decides its speed, its altitude and its path, which no order changes; times are those of the playback.".to_owned();
-    }
-    let images = match all.text("camera.source") {
-        Some(source) if source.starts_with("command:") => {
-            "Its images came from a command (camera.source); what that read is not known. "
-        }
-        _ => "",
-    };
-    let planner = all.settings.get("survey.planner").and_then(Value::as_str).unwrap_or(defaults.survey.planner.name());
-    let way = match planner == PlannerKind::Lawnmower.name() {
-        true => "in straight legs".to_owned(),
-        false => format!("in straight legs and, once a utility was ordered, by the planner {planner}"),
-    };
-    format!(
-        "{images}By its settings it was to survey {} m above the sea floor at {} m/s {way}, with camera images whose pixels are {} m \
-         wide there.",
-        set("survey.altitude_m", defaults.survey.altitude_m),
-        set("survey.speed_m_s", defaults.survey.speed_m_s),
-        set("camera.metres_per_pixel", defaults.camera.metres_per_pixel)
-    )
-}
-
-fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
-    let Some(last) = vehicle.path().last() else { return "It never reported a place.".to_owned() };
-    let depths = || vehicle.path().iter().map(|point| point.depth_m);
-    let (least, most) = (depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max));
-    let origin = dive.state.mission.origin.map_or_else(
-        || "the mission has no latitude and longitude".to_owned(),
-        |origin| format!("the origin is at {}", words::origin(origin)),
-    );
-    let begin = vehicle.path().first().map_or_else(String::new, |first| {
-        format!(
-            " It began {} and {} of the origin{}",
-            words::east(first.east_m),
-            words::north(first.north_m),
-            on_earth(dive, (first.east_m, first.north_m))
-        )
-    });
-    let depth = match format!("{least:.1}") == format!("{most:.1}") {
-        true => format!("at a depth of {least:.1} m"),
-        false => format!("at depths of {least:.1} to {most:.1} m"),
-    };
-    let speed = vehicle.speed_m_s().filter(|_| !vehicle.is_played_back());
-    let speed = speed.map_or_else(String::new, |m_s| format!(", at {m_s:.2} m/s on average while it moved"));
-    let jumps = jumps(vehicle);
-    format!(
-        "By its {} about {:.0} m{jumps}{speed}, {depth} below the surface.{begin}, and ended {} and {} of the origin{}; {origin}.{}{}",
-        if vehicle.own.track.len() > 1 { "own record it went" } else { "reports it went at least" },
-        vehicle.distance_m(),
-        words::east(last.east_m),
-        words::north(last.north_m),
-        on_earth(dive, (last.east_m, last.north_m)),
-        moved(state, vehicle),
-        uncertainty(vehicle)
-    )
-}
-
-/// What its path does not have, in brackets: where it would have had to be faster than it ever was, and what it went while its program
-/// did not run.
-fn jumps(vehicle: &DiveVehicle) -> String {
-    let jumps = vehicle.jumps().filter(|(from, to)| from.distance_m(to) >= LEAST_JUMP_M);
-    let told = jumps.map(|(from, to)| {
-        let (m, from_s, to_s) = (from.distance_m(to), utc_text(from.at_s), utc_text(to.at_s));
-        match vehicle.began_between(from, to) {
-            true => format!(
-                "{m:.0} m between its last place before a restart, {from_s}, and the first one after it, {to_s}"
-            ),
-            false => format!("a jump of {m:.0} m at {to_s}"),
-        }
-    });
-    let told: Vec<String> = told.collect();
-    match told.len() {
-        0 => String::new(),
-        n if n > MAX_JUMPS => format!(" ({n} jumps to another place not counted)"),
-        _ => format!(" (not counted: {})", told.join(", and ")),
-    }
-}
-
-/// How far its own record is moved so that it lies on the map.
-fn moved(state: &VehicleState, vehicle: &DiveVehicle) -> String {
-    let (east_m, north_m) = state.map.shift_m();
-    match vehicle.own.track.is_empty() || east_m.hypot(north_m) < 0.05 {
-        true => String::new(),
-        false => format!(
-            " Places of its own record are moved {} and {}, as its map was by position fixes.",
-            words::east(east_m).replace("east", "to the east").replace("west", "to the west"),
-            words::north(north_m).replace("north", "to the north").replace("south", "to the south")
-        ),
-    }
-}
-
-/// What the uncertainty of a place is.
-const WITHIN: &str =
-    "the uncertainty of its place on the earth (east and north each are within it with a probability of 68 %) was";
-
-/// The uncertainty of its place over the record.
-fn uncertainty(vehicle: &DiveVehicle) -> String {
-    let sigmas = vehicle.path().iter().map(|point| point.sigma_m).filter(|sigma_m| sigma_m.is_finite());
-    let sigmas: Vec<f64> = sigmas.collect();
-    let (Some(median_m), Some(last_m)) = (words::median(&sigmas), sigmas.last()) else { return String::new() };
-    let most_m = sigmas.iter().copied().fold(0.0, f64::max);
-    if !vehicle.measures_sigma() {
-        return format!(
-            " The uncertainty of its place on the earth was not measured: it stayed at {last_m:.2} m, as it began."
-        );
-    }
-    if format!("{median_m:.2} {last_m:.2}") == format!("{most_m:.2} {most_m:.2}") {
-        return format!(" By its own estimate, {WITHIN} {last_m:.2} m.");
-    }
-    let checked = if vehicle.has_fixes() { "" } else { ", which nothing has checked" };
-    format!(
-        " By its own estimate{checked}, {WITHIN} {median_m:.1} m or less half of the time, {most_m:.1} m at most, and {last_m:.1} m at the end."
-    )
 }
 
 fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> String {

@@ -79,11 +79,8 @@ impl DiveVehicle {
         self.own.track.len() <= FEW || most_m - least_m >= 0.005
     }
 
-    /// Its speed while it moved, m/s, where its own record tells it. Times are of the wall clock, which the mission may be ahead of.
+    /// Its speed while it moved, m/s: at least so much, where only reports tell it. Times are of the wall clock, which the mission may be ahead of.
     pub(super) fn speed_m_s(&self) -> Option<f64> {
-        if self.own.track.len() < 2 {
-            return None;
-        }
         let add = |sum: (f64, f64), (m, s): (f64, f64)| (sum.0 + m, sum.1 + s);
         let step = |(a, b): (&TrackPoint, &TrackPoint)| (a.distance_m(b), (b.at_s - a.at_s) * self.mission_speed);
         let whole = self.steps().map(step).fold((0.0, 0.0), add);

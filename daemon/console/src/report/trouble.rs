@@ -2,7 +2,7 @@
 
 use super::dive::SetBack;
 use super::dive::{Dive, DiveVehicle};
-use super::{gaps, words};
+use super::{gaps, uncertainty, words};
 use scenecast_core::utc_text;
 use scenecast_messages::contents::valid_part;
 use scenecast_messages::scenecast_msgs::Event;
@@ -14,53 +14,59 @@ use std::collections::BTreeSet;
 /// The source of events about faults.
 const FAULT: &str = LogKind::Fault.name();
 /// Events that are told in a sentence; of more, the first.
-const MAX_TOLD: usize = 8;
+const MAX_TOLD: usize = 12;
 
-/// The events that people should look at: faults, silences, restarts, and modes that nobody had ordered; then the modes that were ordered
-/// or came from a limit.
+/// The events that people should look at: faults, silences, restarts, and modes that nobody had ordered.
 pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let modes = vehicle.mode_source();
     let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
     let is_restart = |event: &Event| event.source == "contact" && event.text == words::ANOTHER_RUN;
+    let is_of_silence = |event: &Event| ["received", "silent for "].iter().any(|begin| event.text.starts_with(begin));
     let has_own = !vehicle.own.runs_s.is_empty();
     let is_trouble = |event: &Event| match event.source.as_str() {
         FAULT => equipment(&event.text).is_none(),
         _ if event.level >= Event::WARN && event.source.ends_with("on board") && event.source != modes => true,
         source if source == modes => !is_planned(&event.text),
-        // Its own record says when it was.
-        "contact" => event.text != "received" && !(has_own && is_restart(event)),
+        // Silences have their begin and end by the frames; its own record says when it was restarted.
+        "contact" => !(is_of_silence(event) || has_own && is_restart(event)),
         _ => false,
     };
     let of_it = || dive.events.iter().filter(|(_, event)| is_of_it(event));
     let told = |(at_s, event): &(f64, Event)| (*at_s, words::event(&state.label_book, event));
     let restart = |who: &str, (from_s, to_s): (f64, f64), map: String| {
-        (from_s, format!("{who} record stops; its program ran again from {}{map}", utc_text(to_s)))
+        let (again, lasted) = (utc_text(to_s), dive.lasted(to_s - from_s));
+        (from_s, format!("{who} record stops; its program ran again from {again}, {lasted} later{map}"))
     };
     let mut found: Vec<(f64, String)> = of_it().filter(|(_, event)| is_trouble(event)).map(told).collect();
     found.extend(faults(dive, state));
     found.extend(dive.restarts_s.iter().map(|pause| restart("the surface's", *pause, String::new())));
     let pauses = vehicle.own.pauses().zip(&vehicle.own.set_backs);
     let told_of = |set_back: &Option<SetBack>| set_back.map_or_else(String::new, |set_back| set_back.told(dive));
-    found.extend(pauses.map(|(pause, set_back)| restart("the vehicle's", pause, told_of(set_back))));
+    found.extend(pauses.map(|(pause, set_back)| {
+        restart("the vehicle's", pause, told_of(set_back) + &uncertainty::lost(vehicle, pause))
+    }));
+    found.extend(gaps::told(dive, vehicle));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let planned = of_it().filter(|(_, event)| event.source == modes && is_limited(&event.text)).map(told);
-    let planned: Vec<(f64, String)> = planned.collect();
-    let none = match gaps::has_silence(dive, vehicle) {
-        true => "No fault and no restart was reported.",
-        false => "No fault, no restart and no silence was reported.",
-    };
-    let mut sentences = vec![listed("Faults, restarts and silences", &found).unwrap_or_else(|| none.to_owned())];
-    let planned_title = match vehicle.own.runs_s.is_empty() {
+    match found.is_empty() {
+        true => vec!["No fault, no restart and no silence was reported.".to_owned()],
+        false => listed(&found),
+    }
+}
+
+/// The modes in which it did not survey, by order or because of a limit, how long it was in each, and what became of its images.
+pub(super) fn modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
+    let limited = dive.modes(state, vehicle).filter(|(_, event)| is_limited(&event.text));
+    let limited =
+        limited.map(|(at_s, event)| format!("{}, {}", utc_text(at_s), words::event(&state.label_book, event)));
+    let limited: Vec<String> = limited.take(MAX_TOLD).collect();
+    let title = match vehicle.own.runs_s.is_empty() {
         true => "Why it did not survey, when the surface learned of it",
         false => "Why it did not survey",
     };
-    sentences.extend(listed(planned_title, &planned));
-    sentences.extend(times_of_modes(dive, state, vehicle));
-    if !vehicle.own.images.is_empty() {
-        sentences
-            .push(format!("Images by the vehicle's own record: {}.", vehicle.own.images.join(". After a restart: ")));
-    }
-    sentences
+    let limited = (!limited.is_empty()).then(|| format!("{title}: {}.", limited.join("; ")));
+    let images = (!vehicle.own.images.is_empty())
+        .then(|| format!("Images by the vehicle's own record: {}.", vehicle.own.images.join(". After a restart: ")));
+    limited.into_iter().chain(times_of_modes(dive, state, vehicle)).chain(images).collect()
 }
 
 /// The faults that a text of the log names, and whether the survey does not proceed as planned with each; `None` if it is about
@@ -132,21 +138,16 @@ fn is_limited(mode: &str) -> bool {
     !mode.starts_with(VehicleMode::Survey.name()) && !troubles.iter().any(is_of)
 }
 
-fn listed(title: &str, found: &[(f64, String)]) -> Option<String> {
+/// Each of these events in a sentence; of many, the first.
+fn listed(found: &[(f64, String)]) -> Vec<String> {
     let mut said = BTreeSet::new();
-    let told = found.iter().map(|(at_s, text)| match said.insert(text) {
-        true => format!("{}, {text}", utc_text(*at_s)),
-        false => format!("{}, again {text}", utc_text(*at_s)),
+    let told = found.iter().take(MAX_TOLD).map(|(at_s, text)| match said.insert(text) {
+        true => format!("{}: {text}.", utc_text(*at_s)),
+        false => format!("{}: again {text}.", utc_text(*at_s)),
     });
-    let told: Vec<String> = told.collect();
-    match told.len() {
-        0 => None,
-        n if n > MAX_TOLD => {
-            let first = told[..MAX_TOLD].join("; ");
-            Some(format!("{title}: {n} events, which the table of events has; the first were {first}."))
-        }
-        _ => Some(format!("{title}: {}.", told.join("; "))),
-    }
+    let more = found.len().saturating_sub(MAX_TOLD);
+    let more = (more > 0).then(|| format!("{} followed: see the events.", words::counted(more, "more", "more")));
+    told.chain(more).collect()
 }
 
 #[cfg(test)]
@@ -198,13 +199,10 @@ mod tests {
 
     #[test]
     fn of_many_events_the_first_are_told() {
-        let events: Vec<(f64, String)> = (0..9).map(|n| (f64::from(n), format!("event {n}"))).collect();
-        let told = listed("Faults", &events).unwrap();
-        assert!(
-            told.starts_with("Faults: 9 events") && told.contains("event 7") && !told.contains("event 8"),
-            "{told}"
-        );
-        assert_eq!(listed("Faults", &events[..1]).unwrap(), "Faults: 1970-01-01T00:00:00Z, event 0.");
-        assert_eq!(listed("Faults", &[]), None);
+        let events: Vec<(f64, String)> = (0..14).map(|n| (f64::from(n), format!("event {n}"))).collect();
+        let told = listed(&events);
+        assert_eq!((told.len(), told[0].as_str()), (MAX_TOLD + 1, "1970-01-01T00:00:00Z: event 0."));
+        assert_eq!(told[MAX_TOLD], "2 more followed: see the events.");
+        assert_eq!(listed(&[(0.0, "a".to_owned()), (1.0, "a".to_owned())])[1], "1970-01-01T00:00:01Z: again a.");
     }
 }

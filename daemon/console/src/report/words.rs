@@ -17,8 +17,8 @@ pub(super) fn duration(seconds: f64) -> String {
     let s = seconds.max(0.0).round() as u64;
     match s {
         0..=119 => format!("{s} s"),
-        120..=599 => format!("{} min {:02} s", s / 60, s % 60),
-        600..=7199 => format!("{} min", (s + 30) / 60),
+        120..=3599 => format!("{} min {:02} s", s / 60, s % 60),
+        3600..=7199 => format!("{} min", (s + 30) / 60),
         _ => format!("{} h {:02} min", s / 3600, s / 60 % 60),
     }
 }
@@ -49,8 +49,8 @@ pub(super) fn unused(frames: &FrameCounts) -> String {
         other => format!("{count} dropped for {other}"),
     });
     match frames.unused() {
-        0 => "all that arrived were used".to_owned(),
-        unused => format!("{unused} of those that arrived were not used: {}", causes.collect::<Vec<_>>().join(", ")),
+        0 => "none".to_owned(),
+        _ => causes.collect::<Vec<_>>().join(", "),
     }
 }
 
@@ -112,9 +112,14 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
     let text = match (source.as_str(), text.as_str()) {
         ("contact", ANOTHER_RUN) => "the vehicle's program had been restarted".to_owned(),
         ("contact", "received") => "the surface heard it".to_owned(),
-        ("answer", text) => {
-            text.split_once(' ').map_or_else(|| text.to_owned(), |(slot, what)| format!("{} {what}", order(slot, slot)))
-        }
+        ("answer", text) => text.split_once(' ').map_or_else(
+            || text.to_owned(),
+            |(slot, what)| {
+                // No table has the versions.
+                let what = what.strip_prefix("version ").and_then(|rest| Some(rest.split_once(' ')?.1)).unwrap_or(what);
+                format!("{} {what}", order(slot, slot))
+            },
+        ),
         (_, text) => reason.unwrap_or_else(|| match text.strip_prefix("local: ") {
             Some(done) => format!("{}: {done}", author("local")),
             None => text.to_owned(),
@@ -211,7 +216,10 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         ("labels", count) => Some(format!("at most {count} labels")),
         _ => Some(limit(name, value)),
     };
-    let all: Vec<String> = members.iter().filter_map(member).collect();
+    let mut all: Vec<_> = members.iter().collect();
+    // What a budget has to spare comes last.
+    all.sort_by_key(|(name, _)| *name == "background");
+    let all: Vec<String> = all.into_iter().filter_map(member).collect();
     if all.is_empty() { "nothing, so that what was ordered before ends".to_owned() } else { all.join("; ") }
 }
 
@@ -374,12 +382,13 @@ mod tests {
             "weights: label 3 (coral) +0.50, label 4 -1.00"
         );
         assert_eq!(told("record", "label 3: name coral"), "label 3: name coral");
+        assert_eq!(told("answer", "utility version 2 applied"), "weights applied");
     }
 
     #[test]
     fn spans_areas_and_places_are_for_people() {
         assert_eq!((east(-23.58), north(13.0)), ("23.6 m west".to_owned(), "13.0 m north".to_owned()));
-        assert_eq!([59.6, 130.0, 640.0, 7265.0].map(duration), ["60 s", "2 min 10 s", "11 min", "2 h 01 min"]);
+        assert_eq!([59.6, 130.0, 640.0, 7265.0].map(duration), ["60 s", "2 min 10 s", "10 min 40 s", "2 h 01 min"]);
         assert_eq!([3.0625, 415.2, 2.5e6].map(area), ["3.1 m²", "415 m²", "2.50 km²"]);
     }
 }

@@ -1,0 +1,211 @@
+//! The images of a dive, by their classes.
+
+use super::dive::{Dive, DiveVehicle};
+use super::{Escaped, chart, unix_s, words};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use scenecast_core::utc_text;
+use scenecast_messages::scenecast_msgs::Exemplar;
+use scenecast_protocol::directive::SlotId;
+use scenecast_surface::state::VehicleState;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// Images of a label in the report.
+const IMAGES: usize = 3;
+
+/// The images of the classes, and which have none.
+pub(super) fn of_classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
+    let images: Vec<(u8, String)> =
+        vehicle.classes.iter().map(|class| (class.label, images(dive, state, vehicle, class.label))).collect();
+    let all: String = images.iter().map(|(_, images)| images.as_str()).collect();
+    let bare = images.iter().filter(|(_, images)| images.is_empty());
+    let bare = bare.map(|(class, _)| words::label(&state.label_book, *class));
+    let bare: Vec<String> = bare.collect();
+    if !all.is_empty() {
+        let sigma = match all.contains('\u{b1}') {
+            true => {
+                "<p>\u{b1}: the uncertainty of the vehicle's place on the earth when the image was taken (68 %, east and north each).</p>\n"
+            }
+            false => "",
+        };
+        let _ = writeln!(page, "<h3>Images of the classes</h3>\n{sigma}<div class=\"images\">{all}</div>");
+    }
+    if !bare.is_empty() {
+        let _ = writeln!(page, "<p>Classes of which no image was received: {}.</p>", Escaped(&bare.join(", ")));
+    }
+    let changed = vehicle.classes.iter().filter(|class| {
+        let mut of_it = images_of(state, vehicle, class.label).peekable();
+        of_it.peek().is_some() && of_it.all(|(_, exemplar)| !vehicle.shows_class(state, exemplar))
+    });
+    let changed: Vec<String> = changed.map(|class| words::label(&state.label_book, class.label)).collect();
+    if !changed.is_empty() {
+        let _ = writeln!(
+            page,
+            "<p>No image shows these as they are at the end, because the places of all their images have another class by then: {}.</p>",
+            Escaped(&changed.join(", "))
+        );
+    }
+}
+
+/// The labels that have a name or images, and no cell at the end.
+pub(super) fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
+    let book = &state.label_book;
+    let has_cells = |label: u8| vehicle.classes.iter().any(|class| class.label == book.shown_as(label));
+    let named = book.iter().filter(|(_, entry)| entry.name.is_some()).map(|(label, _)| *label);
+    let pictured = vehicle.exemplars.iter().map(|(_, exemplar)| exemplar.label);
+    let had = vehicle.had.iter().copied();
+    let never: Vec<String> = named
+        .filter(|label| !has_cells(*label) && !vehicle.had.contains(label))
+        .map(|label| words::label(book, label))
+        .collect();
+    if !never.is_empty() {
+        let _ = writeln!(page, "<p>People named labels that the map never had: {}.</p>", Escaped(&never.join(", ")));
+    }
+    let labels: BTreeSet<u8> = pictured.chain(had).filter(|label| !has_cells(*label)).collect();
+    if labels.is_empty() {
+        return;
+    }
+    let images = vehicle.exemplars.iter().filter(|(_, exemplar)| labels.contains(&exemplar.label));
+    let images: String = images.map(|found| image(dive, state, vehicle, found, "")).collect();
+    let titles: Vec<String> = labels.iter().map(|label| words::label(book, *label)).collect();
+    let _ = writeln!(
+        page,
+        "<h3>Labels without cells at the end</h3>\n<p>The scene model had these labels for some time; it gave their cells to others: \
+         {}.</p>\n<div class=\"images\">{images}</div>",
+        Escaped(&titles.join(", "))
+    );
+}
+
+/// All images of the labels that are shown as a class.
+fn images_of<'a>(
+    state: &'a VehicleState,
+    vehicle: &'a DiveVehicle,
+    class: u8,
+) -> impl Iterator<Item = &'a (f64, Exemplar)> {
+    vehicle.exemplars.iter().filter(move |(_, exemplar)| state.label_book.shown_as(exemplar.label) == class)
+}
+
+/// When images of a label were newly asked for, but for larger versions, and from when on the vehicle may have sent one because of that.
+fn asked_s(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, label: u8) -> Vec<(f64, f64)> {
+    let mut asked_s = Vec::new();
+    let mut was_asked = false;
+    for (order, given) in vehicle.given.iter().filter(|((slot, _), _)| slot == SlotId::Requests.name()) {
+        let is_asked = vehicle.labels_of_images(order).is_some_and(|labels| labels.contains(&label.into()));
+        let given_s = unix_s(&given.header.stamp);
+        let known_s = vehicle.own.decided_s.get(order).copied().unwrap_or(given_s);
+        let is_new = is_asked && !was_asked && !dive.is_of_larger(state, given);
+        asked_s.extend(is_new.then_some((given_s, known_s)));
+        was_asked = is_asked;
+    }
+    asked_s
+}
+
+/// When an image was asked for, taken and received; nobody asked for most.
+fn times(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, at_s: f64, exemplar: &Exemplar) -> String {
+    let taken = match words::taken(exemplar) {
+        Some(taken) => format!("taken {taken}"),
+        None => "when it was taken is not known, as that was in an earlier run of the vehicle's program, or more than 4 h before it was sent"
+            .to_owned(),
+    };
+    let is_first_after = |from_s: f64| {
+        let mut earlier = vehicle.exemplars.iter().filter(|(_, other)| other.label == exemplar.label);
+        from_s <= at_s && !earlier.any(|(other_s, _)| (from_s..at_s).contains(other_s))
+    };
+    let asked_s =
+        asked_s(dive, state, vehicle, exemplar.label).into_iter().filter(|(_, from_s)| is_first_after(*from_s));
+    let asked = asked_s
+        .map(|(given_s, _)| given_s)
+        .reduce(f64::max)
+        .map_or_else(String::new, |s| format!("asked for {}, ", utc_text(s)));
+    format!("{asked}{taken}, received {}", utc_text(at_s))
+}
+
+/// The largest images of a class, each with its label, time, place and scale.
+fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+    // The label of a place may have changed since its image was sent.
+    let shows_it = |exemplar: &Exemplar| vehicle.shows_class(state, exemplar);
+    let of_it: Vec<_> = images_of(state, vehicle, class).collect();
+    let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
+    found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
+    // Beside them those that the vehicle sent for the class.
+    found.extend(of_it.iter().copied().filter(|(_, exemplar)| !shows_it(exemplar)));
+    let note = |exemplar: &Exemplar| match shows_it(exemplar) {
+        true => String::new(),
+        false => "; by the map at the end its place has another class".to_owned(),
+    };
+    let more = found.len().saturating_sub(IMAGES);
+    let more = if more == 0 { String::new() } else { format!("; {more} more of this class came in") };
+    found.truncate(IMAGES);
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let shown = found.iter().enumerate();
+    shown
+        .map(|(n, found)| image(dive, state, vehicle, found, &(note(&found.1) + if n == 0 { &more } else { "" })))
+        .collect()
+}
+
+/// An image with its label, time, place and scale.
+fn image(
+    dive: &Dive,
+    state: &VehicleState,
+    vehicle: &DiveVehicle,
+    (at_s, exemplar): &(f64, Exemplar),
+    note: &str,
+) -> String {
+    let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
+    let times = times(dive, state, vehicle, *at_s, exemplar);
+    let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
+    let class = state.label_book.shown_as(exemplar.label);
+    let own = words::label(&state.label_book, exemplar.label);
+    let title = match class == exemplar.label {
+        true => own,
+        false => format!("{}, shown as {}", own, words::label(&state.label_book, class)),
+    };
+    let place = || {
+        let sigma = vehicle.sigma_m(unix_s(&exemplar.taken)).filter(|_| vehicle.measures_sigma());
+        let sigma = sigma.map_or_else(String::new, |m| format!(", \u{b1} {m:.1} m"));
+        let on_earth = words::on_earth(dive, (middle.x, middle.y));
+        format!("<br>{}, {}{on_earth}{sigma}", words::east(middle.x), words::north(middle.y))
+    };
+    format!(
+        "<figure><img alt=\"label {label}\" src=\"data:image/{kind};base64,{}\">{}<figcaption>{}<br>{times}{}{note}</figcaption></figure>",
+        BASE64_STANDARD.encode(&exemplar.data),
+        if is_placed { chart::scale_of_image(exemplar.width_m) } else { String::new() },
+        Escaped(&title),
+        if is_placed { place() } else { String::new() },
+        label = exemplar.label
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_messages::builtin_interfaces::Time;
+    use scenecast_messages::scenecast_msgs::Order;
+
+    #[test]
+    fn an_image_has_the_times_of_its_way() {
+        let mut vehicle = DiveVehicle::default();
+        let image = |at_s: f64, taken_s: i64| {
+            (at_s, Exemplar { label: 1, taken: Time::from_nanos(taken_s * 1_000_000_000), ..Exemplar::default() })
+        };
+        vehicle.exemplars = vec![image(20.0, 7), image(40.0, 0), image(50.0, 45)];
+        let mut order = Order {
+            content: "{\"labels\": [1]}".to_owned(),
+            slot: "requests".to_owned(),
+            version: 1,
+            ..Order::default()
+        };
+        order.header.stamp = Time::from_nanos(30_000_000_000);
+        vehicle.given.insert(("requests".to_owned(), 1), order);
+        let (dive, state) = (Dive::default(), VehicleState::default());
+        let told = |n: usize| times(&dive, &state, &vehicle, vehicle.exemplars[n].0, &vehicle.exemplars[n].1);
+        assert_eq!(told(0), "taken 1970-01-01T00:00:07Z, received 1970-01-01T00:00:20Z");
+        assert!(
+            told(1).starts_with("asked for 1970-01-01T00:00:30Z, when it was taken is not known, as"),
+            "{}",
+            told(1)
+        );
+        assert_eq!(told(2), "taken 1970-01-01T00:00:45Z, received 1970-01-01T00:00:50Z");
+    }
+}
