@@ -17,6 +17,7 @@ pub(super) fn duration(seconds: f64) -> String {
     let s = seconds.max(0.0).round() as u64;
     match s {
         0..=119 => format!("{s} s"),
+        120..=3599 if s.is_multiple_of(60) => format!("{} min", s / 60),
         120..=3599 => format!("{} min {:02} s", s / 60, s % 60),
         3600..=7199 => format!("{} min", (s + 30) / 60),
         _ => format!("{} h {:02} min", s / 3600, s / 60 % 60),
