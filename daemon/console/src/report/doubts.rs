@@ -81,7 +81,8 @@ fn relabelled(dive: &Dive, state: &VehicleState) -> Option<String> {
     });
     let before = match shares.len() {
         1 => String::new(),
-        n => format!(" The map had been corrected so {} before.", words::counted(n - 1, "time", "times")),
+        2 => " The map had been corrected so once before.".to_owned(),
+        n => format!(" The map had been corrected so {} times before.", n - 1),
     };
     let doubtful = if named.count() > 0 { "names given and images sent" } else { "images sent and weights ordered" };
     Some(format!(

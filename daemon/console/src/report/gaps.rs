@@ -62,7 +62,11 @@ pub(super) fn told(dive: &Dive, vehicle: &DiveVehicle) -> Vec<(f64, String)> {
         let own = own
             .map(|own| format!("; on board nothing of the surface was heard from {} {}", utc_text(own.0), until(own)));
         let what = if gap.0 <= dive.surface_s.0 { "had not heard it yet" } else { "heard nothing from it" };
-        told.push((gap.0, format!("the surface {what} {}{}", until(gap), own.collect::<String>())));
+        let ran = match dive.restarts_s.iter().any(|pause| meets(pause, gap)) {
+            true => ", for a part of which its own program did not run",
+            false => "",
+        };
+        told.push((gap.0, format!("the surface {what} {}{ran}{}", until(gap), own.collect::<String>())));
     }
     let alone = on_board.iter().filter(|own| !at_surface.iter().any(|gap| meets(own, gap)));
     told.extend(alone.map(|own| (own.0, format!("on board nothing of the surface was heard {}", until(own)))));

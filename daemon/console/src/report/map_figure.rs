@@ -207,15 +207,20 @@ fn track(svg: &mut String, frame: &Frame, vehicle: &DiveVehicle, texts: &mut Tex
 struct Texts(Vec<[f64; 4]>);
 
 impl Texts {
-    /// The width of a character at the most, and the height of a line.
+    /// The width of a character at the most, the height of a line, and the room between texts.
     const CHARACTER: f64 = 7.5;
+    const APART: f64 = 5.0;
     const LINE: f64 = 13.0;
 
     /// Takes the room of a text from its left end and its base line on; false where another one is.
     fn take(&mut self, text: &str, (left, base): (f64, f64)) -> bool {
         let room = [left, base - Self::LINE + 2.0, left + text.chars().count() as f64 * Self::CHARACTER, base + 2.0];
-        let meets =
-            |other: &[f64; 4]| room[0] < other[2] && other[0] < room[2] && room[1] < other[3] && other[1] < room[3];
+        let meets = |other: &[f64; 4]| {
+            room[0] < other[2] + Self::APART
+                && other[0] < room[2] + Self::APART
+                && room[1] < other[3]
+                && other[1] < room[3]
+        };
         let is_free = !self.0.iter().any(meets);
         self.0.extend(is_free.then_some(room));
         is_free
@@ -353,6 +358,7 @@ mod tests {
         let mut texts = Texts::default();
         assert!(texts.take("12", (100.0, 50.0)));
         assert!(!texts.take("16", (110.0, 50.0)), "it would read 1216");
-        assert!(texts.take("16", (110.0, 70.0)) && texts.take("16", (120.0, 50.0)));
+        assert!(!texts.take("16", (116.0, 50.0)), "without room between them");
+        assert!(texts.take("16", (110.0, 70.0)) && texts.take("16", (125.0, 50.0)));
     }
 }

@@ -70,10 +70,9 @@ impl Dive {
             self.state.mission.origin.map_or_else(String::new, |origin| format!(", at {}", words::origin(origin)));
         let _ = writeln!(
             page,
-            "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, which {} wrote from {begin} to {end}. \
+            "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, recorded from {begin} to {end}. \
              The map is the operator's: what had arrived over the link. Areas are counts of cells. Names of classes are those at the end.</p>\n{}<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
              sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}{reported}.</p>\n</body></html>",
-            Escaped(recorded),
             self.files_table(),
             Escaped(&names.join(", ")),
             Escaped(recorded),

@@ -122,6 +122,7 @@ fn times_of_modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> O
             None => spent.push((mode, time_s)),
         }
     }
+    spent.retain(|(_, time_s)| *time_s >= 0.5);
     let told: Vec<String> = spent.iter().map(|(mode, time_s)| format!("{mode} {}", dive.lasted(*time_s))).collect();
     (told.len() > 1).then(|| format!("Time in each mode by its own record: {}.", told.join(", ")))
 }

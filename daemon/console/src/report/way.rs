@@ -76,10 +76,9 @@ pub(super) fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) ->
         (Some(deep), Some(rising)) => format!("at {deep} below the surface until it rose to it, and at {rising} then"),
         (one, other) => format!("at {} below the surface", one.or(other).unwrap_or_default()),
     };
-    let least = if vehicle.own.track.len() > 1 { "" } else { "at least " };
-    let speed = vehicle
-        .speed_m_s()
-        .map_or_else(String::new, |m_s| format!(", at {least}{m_s:.2} m/s on average while it moved"));
+    let least = if vehicle.own.track.len() > 1 { "at" } else { "no slower than" };
+    let speed =
+        vehicle.speed_m_s().map_or_else(String::new, |m_s| format!(", {least} {m_s:.2} m/s on average while it moved"));
     let jumps = jumps(vehicle);
     format!(
         "By its {} about {:.0} m{jumps}{speed}, {depth}.{begin}, and ended {} and {} of the origin{}; {origin}.{}{}",

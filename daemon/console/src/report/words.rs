@@ -16,7 +16,9 @@ use std::collections::BTreeSet;
 pub(super) fn duration(seconds: f64) -> String {
     let s = seconds.max(0.0).round() as u64;
     match s {
+        0..=1 if (0.05..0.95).contains(&seconds) => format!("{seconds:.1} s"),
         0..=119 => format!("{s} s"),
+        120..=3599 if s.is_multiple_of(60) => format!("{} min", s / 60),
         120..=3599 => format!("{} min {:02} s", s / 60, s % 60),
         3600..=7199 => format!("{} min", (s + 30) / 60),
         _ => format!("{} h {:02} min", s / 3600, s / 60 % 60),
@@ -388,7 +390,8 @@ mod tests {
     #[test]
     fn spans_areas_and_places_are_for_people() {
         assert_eq!((east(-23.58), north(13.0)), ("23.6 m west".to_owned(), "13.0 m north".to_owned()));
-        assert_eq!([59.6, 130.0, 640.0, 7265.0].map(duration), ["60 s", "2 min 10 s", "10 min 40 s", "2 h 01 min"]);
+        assert_eq!([0.25, 59.6, 130.0].map(duration), ["0.2 s", "60 s", "2 min 10 s"]);
+        assert_eq!([640.0, 750.0, 720.0, 7265.0].map(duration), ["10 min 40 s", "12 min 30 s", "12 min", "2 h 01 min"]);
         assert_eq!([3.0625, 415.2, 2.5e6].map(area), ["3.1 m²", "415 m²", "2.50 km²"]);
     }
 }
