@@ -139,13 +139,14 @@ impl DiveVehicle {
         let is_current = |exemplar: &Exemplar| exemplar.epoch == u32::from(shown.epoch);
         let exemplars = known.exemplars.iter().filter(|(_, exemplar)| is_current(exemplar));
         for (at, exemplar) in exemplars {
-            // A surface that was restarted has recorded again what it knew.
-            let is_same = |other: &Exemplar| {
-                (other.label, other.image, &other.data) == (exemplar.label, exemplar.image, &exemplar.data)
-            };
-            if !vehicle.exemplars.iter().any(|(_, other)| is_same(other)) {
-                let received = exemplar.header.stamp.nanos().max(0) as u64;
-                vehicle.exemplars.push((seconds(if received == 0 { *at } else { received }), exemplar.clone()));
+            let received = exemplar.header.stamp.nanos().max(0) as u64;
+            let arrived = (seconds(if received == 0 { *at } else { received }), exemplar.clone());
+            let is_of_it = |other: &Exemplar| (other.label, other.image) == (exemplar.label, exemplar.image);
+            match vehicle.exemplars.iter_mut().find(|(_, other)| is_of_it(other)) {
+                // A surface that was restarted has recorded again what it knew; a larger image takes the place of a smaller one.
+                Some((_, known)) if known.data == exemplar.data => {}
+                Some(known) => *known = arrived,
+                None => vehicle.exemplars.push(arrived),
             }
         }
         for order in &known.given {

@@ -109,8 +109,8 @@ struct RecordedVehicle {
     orders: BTreeMap<String, (u16, OrderStatus)>,
     /// Mission time of the last report.
     report_s: Option<f64>,
-    /// Epoch, label and number of the images.
-    exemplars: BTreeSet<(u8, u8, u8)>,
+    /// Epoch, label, number and size of the images: a larger one takes the place of one of the same number.
+    exemplars: BTreeSet<(u8, u8, u8, u8)>,
 }
 
 /// What a record has of a layer.
@@ -282,7 +282,7 @@ impl RecordedVehicle {
         let Some(record) = seen.address().and_then(|address| surface.record(address)) else { return };
         let images = record.exemplars.labels().flat_map(|(label, of_it)| of_it.stored.iter().map(move |i| (label, i)));
         for (label, image) in
-            images.filter(|(label, image)| self.exemplars.insert((record.epoch, *label, image.number)))
+            images.filter(|(label, image)| self.exemplars.insert((record.epoch, *label, image.number, image.size)))
         {
             let place = image.place_m(vehicle.map.shift_m());
             let message = Exemplar {
