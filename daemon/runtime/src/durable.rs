@@ -1,7 +1,7 @@
 //! The vehicle's durable state, read at the start of a run and kept during it, and the free space of its disk.
 
+use super::checkpoint::has_checkpoint;
 use super::journal::{Damage, Found, Journal, JournalNames, Storage};
-use super::restore;
 use scenecast_config::{Config, StartMode};
 use scenecast_core::{TangentPlane, UserError};
 use scenecast_files::{CoordinateFrame, read_fence};
@@ -91,7 +91,7 @@ impl<S: Storage> Keeper<S> {
             forgetful(&storage.path(name), damage, lineage, checkpoint, first)
         };
         let (mut durable, is_again) = match found {
-            Found::Absent if !restore::has_checkpoint(storage) => (first.durable(lineage), false),
+            Found::Absent if !has_checkpoint(storage) => (first.durable(lineage), false),
             Found::Absent => (forgotten(JOURNAL.journal, &Damage::Missing), true),
             Found::Lost(name, damage) => (forgotten(name, &damage), true),
             Found::State { body, damage } => match decode(&body) {

@@ -1,8 +1,8 @@
 //! The meaning of a label, through power cuts at any step of the disk and of the host.
 
+use super::checkpoint::CheckpointFile;
 use super::durable::{FirstStart, Keeper, StartedRun};
 use super::journal::disk::{Disk, DiskRng, DiskStep};
-use super::restore::CheckpointFile;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, TopicId};
 use scenecast_config::Config;

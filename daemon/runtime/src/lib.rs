@@ -1,6 +1,7 @@
 //! The tokio shells around the hosts: they move bytes, read the clock and write files.
 
 mod camera;
+mod checkpoint;
 mod clock;
 mod doctor;
 mod durable;

@@ -1,7 +1,6 @@
 //! The scene model's own thread, fed by the camera, and images that place the frames elsewhere than the navigation source does.
 
-use super::journal::Folder;
-use super::restore::CheckpointFile;
+use super::checkpoint::Keep;
 use crate::camera::{CameraFrame, FramePicture, ReadFrame};
 use scene_model::project::Pose;
 use scenecast_config::{AutopilotKind, Config};
@@ -78,52 +77,6 @@ impl MapperThread {
         if self.thread.join().is_err() {
             tracing::error!("the scene model's thread has panicked: its changes since the last checkpoint are lost");
         }
-    }
-}
-
-/// Schedule and file of the checkpoints.
-pub(super) struct Keep {
-    pub(super) file: CheckpointFile<Folder>,
-    pub(super) lineage: u64,
-    /// Seconds of mission time between two checkpoints; 0 for none.
-    pub(super) every_s: f64,
-    /// Mission time of the last attempt to write a checkpoint, or of the first frame.
-    pub(super) last_s: Option<f64>,
-    /// Whether the last checkpoint was refused.
-    pub(super) is_refused: bool,
-}
-
-impl Keep {
-    /// Keeps a checkpoint if one is due. A failing disk does not end the mission: the previous checkpoint stays.
-    fn keep(&mut self, mapper: &impl MapProducer, is_due: impl Fn(f64) -> bool) {
-        let Some(now_s) = mapper.last_s().filter(|_| self.every_s > 0.0) else { return };
-        if !is_due(self.last_s.map_or(f64::INFINITY, |last_s| (now_s - last_s).abs())) {
-            return;
-        }
-        let kept = self.file.keep(&mapper.save(self.lineage));
-        self.last_s = Some(now_s);
-        let was_refused = std::mem::replace(&mut self.is_refused, kept.is_err());
-        match kept {
-            Ok(()) if was_refused => tracing::info!("checkpoints of the scene model are written again"),
-            Err(error) if !was_refused => {
-                tracing::error!(
-                    "no checkpoint of the scene model at {now_s} s, tried again every {} s: {error}",
-                    self.every_s
-                );
-            }
-            Ok(()) | Err(_) => {}
-        }
-    }
-
-    pub(super) fn keep_if_due(&mut self, mapper: &impl MapProducer) {
-        let every_s = self.every_s;
-        // The interval begins at the first frame, whose map is not worth a checkpoint of its own.
-        self.last_s = self.last_s.or(mapper.last_s());
-        self.keep(mapper, |since_s| since_s >= every_s);
-    }
-
-    pub(super) fn keep_now(&mut self, mapper: &impl MapProducer) {
-        self.keep(mapper, |since_s| since_s > 0.0);
     }
 }
 
@@ -256,6 +209,8 @@ impl Disagreement {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checkpoint::CheckpointFile;
+    use crate::journal::Folder;
     use image::{Rgb, RgbImage};
     use scenecast_files::{FrameImage, RecordedFrame};
 

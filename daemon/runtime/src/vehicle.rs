@@ -1,11 +1,12 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
+use super::checkpoint::Keep;
 use super::clock::{Clock, utc_hours};
 use super::durable::{Checkpoint, DiskWatch, Keeper, StartedRun};
 use super::equipment::SensorFaults;
 use super::journal::Folder;
 use super::labels::{self, FromLabels, LabelThread, move_the_vehicle};
-use super::mapping::{Disagreement, FromMapper, Keep, Mapped, MapperThread, ToMapper};
+use super::mapping::{Disagreement, FromMapper, Mapped, MapperThread, ToMapper};
 use super::modem::{self, ModemPort, warn_without_key};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::record::VehicleRecord;

@@ -19,9 +19,9 @@ use refusal_log::RefusalLog;
 pub(super) use restore::{open, restore};
 pub(super) use topic::topic;
 
+use super::checkpoint::Keep;
 use super::clock::Clock;
 use super::equipment::{LabelHealth, LabelTally};
-use super::mapping::Keep;
 use scenecast_config::{AutopilotKind, Config, LabelSource, NavigationSource};
 use scenecast_core::UserError;
 use scenecast_labels::{Content, ImagePose, Item, ItemTime, Refusal};

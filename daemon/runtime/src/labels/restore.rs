@@ -2,8 +2,8 @@
 
 use super::feed::{Feed, Feeds};
 use super::topic::TopicFeed;
+use crate::checkpoint::CheckpointFile;
 use crate::journal::Folder;
-use crate::restore::CheckpointFile;
 use scenecast_config::{Config, LabelMessage, LabelSource};
 use scenecast_core::UserError;
 use scenecast_files::LabelFolder;

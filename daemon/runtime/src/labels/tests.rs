@@ -1,7 +1,7 @@
 use super::feed::{Answer, LabelQueue};
 use super::*;
+use crate::checkpoint::CheckpointFile;
 use crate::journal::Folder;
-use crate::restore::CheckpointFile;
 use scenecast_labels::{Ground, Raster};
 use scenecast_protocol::time::Instant as MissionTime;
 use scenecast_vehicle::LabelChanges;
