@@ -70,7 +70,7 @@ fn scene(m: &Mission) -> Value {
     json!({
         "cells": if m.has_foreign_labels() { m.vehicle().map().explored() } else { m.mapper.cells() },
         "words": m.mapper.words(),
-        "labels": m.logbook.labels,
+        "labels": m.logbook.labels.highest,
         "perplexity": round(m.mapper.perplexity()),
         "mutual_information_nats": of(|a| a.nats),
         "normalised_mutual_information": of(|a| a.normalised),

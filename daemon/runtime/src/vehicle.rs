@@ -142,6 +142,9 @@ impl VehicleShell {
         let clock = Clock::new(config.runtime.time_scale);
         let profile = scenecast_drivers::modem::modem_of_process(config, address)?;
         let recording = configured_recording(config)?;
+        for note in recording.iter().flat_map(|recording| &recording.notes) {
+            tracing::warn!("camera.source: {note}");
+        }
         let (vehicle, keeper) = vehicle_of(config, authenticity, run, profile, recording.as_ref(), clock.now())?;
         // Files that do not end, such as a pipe for a key, are read above: until there a signal ends the program at once.
         let stop = Stop::new()?;

@@ -62,6 +62,15 @@ impl Cells {
         changes
     }
 
+    /// The map of the last frame is as it was, after a restart; depths, last sights and levels are those of the checkpoint.
+    pub(super) fn restore(&mut self, map: &[PublishedCell]) {
+        for (shown, record) in in_step(self.0.iter_mut(), map.iter(), |shown| (shown.y, shown.x)) {
+            if let Some(record) = record {
+                (record.label, record.perplexity) = (shown.label, shown.perplexity);
+            }
+        }
+    }
+
     /// Everything that the map has of each cell, without camera frame and labels' tree.
     pub(super) fn all(&self) -> (Vec<(Cell, u8)>, MapChanges) {
         let shown = || self.0.iter().filter(|(_, record)| record.label != 0);

@@ -62,11 +62,12 @@ impl MapChanges {
         Self { labels: Some(LabelChanges { epoch, highest, cells, tree: None }), ..Self::default() }
     }
 
-    /// Adds later changes of the same producer, which replace these where both have a cell.
+    /// Adds later changes of the same producer, which replace these where both have a cell. Labels of another epoch, with which every
+    /// cell is given again, replace all.
     pub fn then(&mut self, later: &Self) {
         match (&mut self.labels, &later.labels) {
             (Some(labels), Some(later)) if labels.epoch == later.epoch => labels.then(later),
-            (labels, Some(later)) => *labels = Some(later.clone()),
+            (_, Some(_)) => return self.clone_from(later),
             (_, None) => {}
         }
         for (&id, levels) in &later.layers {
@@ -132,6 +133,6 @@ mod tests {
         all.then(&MapChanges::default());
         assert_eq!(all.labels.as_ref().unwrap().cells.len(), 3, "a producer without labels");
         all.then(&changes(2, 1, &[(c, 1)]));
-        assert_eq!(all.labels.unwrap().cells, [(c, 1)], "labels of another epoch mean something else");
+        assert_eq!(all, changes(2, 1, &[(c, 1)]), "labels of another epoch mean something else");
     }
 }

@@ -277,7 +277,7 @@ impl Mapper {
         if let Some(habitats) = &self.habitats {
             self.flat = habitats.labelled(&self.flat);
         }
-        let _ = self.cells.take(&self.book.published(&self.flat), self.last_s.unwrap_or(0.0), &self.scales);
+        self.cells.restore(&self.book.published(&self.flat));
     }
 
     /// The configured size of a pixel on the sea floor, metres.

@@ -14,8 +14,8 @@ pub struct FrameTimes {
 
 /// No frame is under way for longer, nanoseconds.
 const LONGEST: u64 = 20_000_000_000;
-/// So much earlier than it was sent, a frame may seem to arrive by clocks that agree, nanoseconds.
-const EARLY: u64 = 1_000_000_000;
+/// A copy that seems to arrive so much before it was sent, or before all shorter frames, is another one, nanoseconds.
+const EARLY: u64 = 2_000_000_000;
 
 /// The length of a frame, and its fingerprint.
 type FrameKey = (u32, u64);
@@ -104,9 +104,9 @@ impl FrameTimes {
             let copies = fates.entry(*frame).or_default();
             for arrival in arrivals(frame) {
                 // An arrival is that of the copy that was to arrive next to it; a second copy of one is none.
-                let near = copies
-                    .iter_mut()
-                    .filter(|copy| copy.sent <= arrival + EARLY && copy.arrives.abs_diff(arrival) < LONGEST);
+                let near = copies.iter_mut().filter(|copy| {
+                    copy.sent <= arrival.saturating_add(EARLY) && copy.arrives.abs_diff(arrival) < LONGEST
+                });
                 match near.min_by_key(|copy| copy.arrives.abs_diff(arrival)) {
                     Some(copy) => copy.received = copy.received.or(Some(arrival)),
                     // It was sent before the record of its sender began, or while that was not written.
@@ -173,18 +173,21 @@ fn carried(values: impl Iterator<Item = Option<i64>>) -> Vec<Option<i64>> {
 
 /// The least time from sending to reception, as the two clocks show it, of frames that were sent and received once. The same bytes may
 /// have been sent while no record was written, and what was received is then another copy: a time far below that of most frames is
-/// left out, and of more than ten frames the quickest ones, one in fifty.
+/// left out, and one far below those of several frames that are no longer.
 fn quickest(sent: &Times, received: &Times) -> Option<i64> {
     let time = |(frame, sent): (&FrameKey, &Vec<u64>)| match (sent.as_slice(), received.get(frame)?.as_slice()) {
-        (&[sent], &[received]) => i64::try_from(i128::from(received) - i128::from(sent)).ok(),
+        (&[sent], &[received]) => Some((i64::try_from(i128::from(received) - i128::from(sent)).ok()?, frame.0)),
         _ => None,
     };
-    let mut times: Vec<i64> = sent.iter().filter_map(time).collect();
+    let mut times: Vec<(i64, u32)> = sent.iter().filter_map(time).collect();
     times.sort_unstable();
-    let median = *times.get(times.len() / 2)?;
-    times.retain(|time| median.abs_diff(*time) < LONGEST);
-    let left_out = if times.len() > 10 { times.len().div_ceil(50) } else { 0 };
-    times.get(left_out).copied()
+    let (median, _) = *times.get(times.len() / 2)?;
+    times.retain(|(time, _)| median.abs_diff(*time) < LONGEST);
+    let is_another = |&(time, bytes): &(i64, u32)| {
+        let mut no_longer = times.iter().filter(|other| other.1 <= bytes && other.0 > time);
+        no_longer.nth(2).is_some_and(|third| third.0.abs_diff(time) > EARLY)
+    };
+    times.iter().find(|time| !is_another(time)).map(|(time, _)| *time)
 }
 
 #[cfg(test)]
@@ -268,6 +271,23 @@ mod tests {
         let late: Vec<_> = (0..40u8).map(|byte| (Frame::RECEIVED, byte, (151 + 10 * u64::from(byte)) * s)).collect();
         let late = times(&[late, vec![(Frame::SENT, 200, 950 * s)]].concat());
         assert_eq!(late.shift_to(&surface), -50 * s as i64);
+    }
+
+    #[test]
+    fn a_short_frame_may_be_much_quicker_than_long_ones() {
+        let ms = 1_000_000;
+        let (mut vehicle, mut surface) = (FrameTimes::default(), FrameTimes::default());
+        for byte in 0..11u8 {
+            // The surface's clock is 60 s behind, and nothing of the surface is heard.
+            let (sent, data) = ((100 + 10 * u64::from(byte)) * 1000 * ms, vec![byte; if byte == 4 { 8 } else { 64 }]);
+            let arrival = sent - 60_000 * ms + if byte == 4 { 500 } else { 4000 } * ms;
+            vehicle.take(sent, &Frame { direction: Frame::SENT, data: data.clone(), ..Frame::default() });
+            surface.take(arrival, &Frame { direction: Frame::RECEIVED, data, ..Frame::default() });
+        }
+        let shift = vehicle.shift_to(&surface);
+        let fates = vehicle.fates(&surface, shift);
+        assert_eq!((shift, fates.len()), (-59_500 * ms as i64, 11));
+        assert!(fates.iter().all(|frame| frame.received.is_some()));
     }
 
     #[test]

@@ -39,9 +39,8 @@ pub(crate) struct Logbook {
     pub(crate) poses: Vec<FramePoses>,
     /// All registered frames, to place them together after the survey.
     pub(crate) graph: FrameGraph,
-    /// The vehicle's map as its producers have given it, and its highest label.
-    map: LabelGrid,
-    pub(crate) labels: u8,
+    /// The labels of the vehicle's map as its producers have given them.
+    pub(crate) labels: GivenLabels,
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,
     map_version: u64,
@@ -57,6 +56,14 @@ pub(crate) struct Logbook {
     pub(crate) events: Option<Vec<(Instant, EndEvent)>>,
     /// Frames of a recording that cannot be read: how many, and why the first one.
     pub(crate) unreadable: Option<(u64, String)>,
+}
+
+/// Labels of a map, their epoch and the highest of them.
+#[derive(Default)]
+pub(crate) struct GivenLabels {
+    cells: LabelGrid,
+    epoch: u8,
+    pub(crate) highest: u8,
 }
 
 /// An event of one of the ends.
@@ -100,13 +107,16 @@ impl Logbook {
             let png = scenecast_core::label_picture::encode(vehicle.map());
             self.png_full_bytes += png.map_or(0, |png| png.len() as u64);
         }
+        if std::mem::replace(&mut self.labels.epoch, labels.epoch) != labels.epoch {
+            self.labels.cells.clear();
+        }
         for &(cell, label) in &labels.cells {
-            match self.map.set(cell, label) {
+            match self.labels.cells.set(cell, label) {
                 UNEXPLORED => _ = self.first_seen_s.entry(cell).or_insert(now.as_secs_f64()),
                 before => self.flips += u64::from(before != label),
             }
         }
-        self.labels = labels.highest;
+        self.labels.highest = labels.highest;
     }
 }
 

@@ -139,9 +139,6 @@ impl Camera {
         clock: Clock,
         last_s: Option<f64>,
     ) -> Result<Self, UserError> {
-        for note in recording.iter().flat_map(|recording| &recording.notes) {
-            tracing::warn!("camera.source: {note}");
-        }
         // Without a camera, poses of a navigation source move the vehicle.
         let is_live = config.camera.source.is_live() || recording.is_none() && config.navigation.source.is_live();
         if !is_live {

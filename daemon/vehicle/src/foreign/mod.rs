@@ -290,8 +290,8 @@ impl MapProducer for ForeignMap {
         self.last_s
     }
 
-    fn resume(&mut self, epoch: u8, _published: u8) {
-        self.epoch = epoch;
+    fn resume(&mut self, epoch: u8, published: u8) {
+        (self.epoch, self.highest) = (epoch, self.highest.max(published));
     }
 
     fn save(&self, lineage: u64) -> Vec<u8> {

@@ -128,3 +128,24 @@ fn a_band_that_is_sent_again_is_up_to_date() {
     budget(&mut vehicle, with_it);
     assert_eq!((level(&vehicle, FINE), level(&vehicle, gone)), (8, 0));
 }
+
+#[test]
+fn a_level_that_is_not_known_any_more_reaches_a_layer_that_rests() {
+    let mut vehicle = vehicle();
+    let depth = |vehicle: &mut Vehicle, level: u8| {
+        let layers = [(LayerId::DEPTH, vec![(FINE, level)])].into();
+        vehicle.handle_changes(&MapChanges { layers, ..MapChanges::default() }, Instant::ZERO);
+    };
+    let select = |vehicle: &mut Vehicle, cells: CellBand, layers: &[LayerId]| {
+        let layers = Change::To(layers.iter().copied().collect());
+        let settings = Settings { cells: Change::To(cells), layers, ..Settings::default() };
+        vehicle.apply(Slot::Settings(settings), Instant::ZERO).unwrap();
+    };
+    select(&mut vehicle, CellBand::Fine, &[LayerId::DEPTH]);
+    depth(&mut vehicle, 253);
+    select(&mut vehicle, CellBand::Coarse, &[]);
+    depth(&mut vehicle, 0);
+    select(&mut vehicle, CellBand::Fine, &[LayerId::DEPTH]);
+    let sent = vehicle.layers().find(|layer| layer.id() == LayerId::DEPTH).unwrap();
+    assert_eq!(sent.target().get(FINE), 0);
+}

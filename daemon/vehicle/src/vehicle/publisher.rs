@@ -274,10 +274,11 @@ impl MapPublisher {
         }
     }
 
-    /// Gives the link the selected ones of the cells of a layer.
+    /// Gives the link the selected ones of the cells of a layer, and those that are no longer known.
     fn set_levels(&self, id: LayerId, cells: impl Iterator<Item = (Cell, u8)>, link: &mut VehicleLink, now: Instant) {
         let sent = sent_of(link, id);
-        let cells: Vec<(Cell, u8)> = cells.filter(|&(cell, _)| self.is_sent(sent, cell)).collect();
+        let cells: Vec<(Cell, u8)> =
+            cells.filter(|&(cell, level)| level == UNEXPLORED || self.is_sent(sent, cell)).collect();
         if !cells.is_empty() {
             link.set_levels(id, cells, now);
         }

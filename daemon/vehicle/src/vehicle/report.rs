@@ -35,7 +35,7 @@ impl Vehicle {
         self.link.layers()
     }
 
-    /// Why a cell of [`Self::map`] has its label, if a camera frame of this run gave it.
+    /// Why a cell of [`Self::cells`] has its label, if a camera frame of this run gave it.
     pub fn evidence(&self, cell: Cell) -> Option<&Evidence> {
         self.publisher.evidence(cell)
     }

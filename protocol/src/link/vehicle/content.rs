@@ -71,13 +71,13 @@ impl<S: StateSource> VehicleContent<S> {
         released
     }
 
-    /// The surface holds none of our state any more.
     /// Sets whether the surface reads the plainest form of chunks alone.
     pub(super) fn set_plain(&mut self, is_plain: bool) {
         self.source.set_plain(is_plain);
         self.layers.iter_mut().for_each(|l| l.source.set_plain(is_plain));
     }
 
+    /// The surface holds none of our state any more.
     pub(super) fn handle_peer_restart(&mut self, now: Instant) {
         self.source.handle_peer_restart(now);
         self.classes.handle_peer_restart();
