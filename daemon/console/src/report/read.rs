@@ -13,7 +13,7 @@ use crate::recording::{Recording, StateText};
 use scenecast_core::UserError;
 use scenecast_files::RecordFile;
 use scenecast_messages::contents::valid_part;
-use scenecast_messages::geometry_msgs::{Point, PoseWithCovarianceStamped};
+use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar};
 use scenecast_surface::state::{LinkDirection, LinkSummary, MissionState, VehicleState};
 use std::collections::BTreeMap;
@@ -141,11 +141,8 @@ impl DiveVehicle {
         for (at, exemplar) in exemplars {
             let received = exemplar.header.stamp.nanos().max(0) as u64;
             let arrived = (seconds(if received == 0 { *at } else { received }), exemplar.clone());
-            let picture = |of: &Exemplar| {
-                let Point { x, y, .. } = of.middle;
-                (of.label, of.image, of.taken.nanos(), x.to_bits(), y.to_bits())
-            };
-            match vehicle.exemplars.iter_mut().find(|(_, other)| picture(other) == picture(exemplar)) {
+            let number = |of: &Exemplar| (of.label, of.image);
+            match vehicle.exemplars.iter_mut().find(|(_, other)| number(other) == number(exemplar)) {
                 // A larger one takes the place of a smaller one. A surface that was restarted has recorded again what it knew.
                 Some(known) if known.1.data.len() < exemplar.data.len() => *known = arrived,
                 Some(_) => {}
