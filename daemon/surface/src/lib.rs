@@ -53,7 +53,7 @@ pub use orders::{
     AgainOrder, AreaOrder, AreasOrder, BudgetOrder, CONSTRAINT_NAMES, CommandOrder, CommandOrderAction,
     ConstraintsAction, ConstraintsOrder, DestinationOrder, DismissOrder, DraftOrder, ExemplarAction, ExemplarOrder,
     FenceOrder, LabelOrder, LimitsOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder, RestoreOrder,
-    SettingsOrder, SharesOrder, TakeOverOrder, UtilityOrder, order_name,
+    SettingsOrder, SharesOrder, TakeOverOrder, UtilityOrder, member_in_words, order_name, value_in_words,
 };
 pub use refusal::{OrderRefusal, Weighed};
 pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, former_labels, handle_request};

@@ -49,8 +49,9 @@ pub(super) fn silences(dive: &Dive, vehicle: &DiveVehicle) -> Vec<(f64, f64)> {
 
 /// The silences at the surface and, by the vehicle's own record, on board, with their begins: each once, in words.
 pub(super) fn told(dive: &Dive, vehicle: &DiveVehicle) -> Vec<(f64, String)> {
-    let at_surface = longest(silences(dive, vehicle));
-    let more = silences(dive, vehicle).len() - at_surface.len();
+    let all = silences(dive, vehicle);
+    let more = all.len().saturating_sub(MAX_TOLD);
+    let at_surface = longest(all);
     let runs_s = &vehicle.own.runs_s;
     let span = runs_s.first().zip(runs_s.last()).map(|(first, last)| (first.0, last.1));
     let on_board = longest(span.map_or_else(Vec::new, |span| long(dive, &vehicle.own.heard_s, span)));

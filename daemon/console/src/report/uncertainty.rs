@@ -2,7 +2,7 @@
 
 use super::dive::DiveVehicle;
 use super::track_point::TrackPoint;
-use super::words;
+use super::words::{self, metres};
 use scenecast_core::utc_text;
 
 /// What the uncertainty of a place is.
@@ -76,12 +76,6 @@ pub(super) fn lost(vehicle: &DiveVehicle, (stopped_s, began_s): (f64, f64)) -> S
         }
         _ => String::new(),
     }
-}
-
-/// One figure where both ends are the same for people.
-fn metres(least_m: f64, most_m: f64) -> String {
-    let [least, most] = [least_m, most_m].map(|m| format!("{m:.1}"));
-    if least == most { format!("{least} m") } else { format!("{least} to {most} m") }
 }
 
 /// The levels of the uncertainty, one after the other.

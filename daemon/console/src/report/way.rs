@@ -142,10 +142,8 @@ fn depths(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> (Vec<f64>
 /// The least and the greatest of some depths in words; `None` without any.
 fn range(depths_m: &[f64]) -> Option<String> {
     let (least, most) = (depths_m.iter().copied().reduce(f64::min)?, depths_m.iter().copied().reduce(f64::max)?);
-    Some(match format!("{least:.1}") == format!("{most:.1}") {
-        true => format!("a depth of {least:.1} m"),
-        false => format!("depths of {least:.1} to {most:.1} m"),
-    })
+    let told = words::metres(least, most);
+    Some(if told.contains(" to ") { format!("depths of {told}") } else { format!("a depth of {told}") })
 }
 
 #[cfg(test)]

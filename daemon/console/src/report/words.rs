@@ -8,7 +8,7 @@ use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::state::{Origin, VehicleState};
-use scenecast_surface::{LabelBook, LogKind};
+use scenecast_surface::{LabelBook, LogKind, member_in_words, value_in_words};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -198,7 +198,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
         }
         ("areas", Value::Array(areas)) => {
             let corners = |area: &Value| area["outline"].as_array().map(|corners| outline(corners)).unwrap_or_default();
-            let told = |area: &Value| format!("weight {} ({})", number(&area["weight"]), corners(area));
+            let told = |area: &Value| format!("weight {} ({})", value_in_words(&area["weight"]), corners(area));
             let all: Vec<String> = areas.iter().map(told).collect();
             Some(format!("{}: {}", counted(areas.len(), "area", "areas"), all.join("; ")))
         }
@@ -234,14 +234,14 @@ pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
 fn outline(corners: &[Value]) -> String {
     let is_closed = corners.len() > 1 && corners.first() == corners.last();
     let corners = &corners[..corners.len() - usize::from(is_closed)];
-    let place = |corner: &Value| format!("({}, {})", number(&corner[0]), number(&corner[1]));
+    let place = |corner: &Value| format!("({}, {})", value_in_words(&corner[0]), value_in_words(&corner[1]));
     let places: Vec<String> = corners.iter().map(place).collect();
     format!("{} in m east and north: {}", counted(corners.len(), "corner", "corners"), places.join(" "))
 }
 
 /// A place in the world frame.
 fn east_north((east, north): (&Value, &Value)) -> String {
-    format!("{} m east, {} m north", number(east), number(north))
+    format!("{} m east, {} m north", value_in_words(east), value_in_words(north))
 }
 
 /// Metres east of the mission's origin in words; below 0 they are west of it.
@@ -254,26 +254,17 @@ pub(super) fn north(m: f64) -> String {
     format!("{:.1} m {}", m.abs(), if m < 0.0 { "south" } else { "north" })
 }
 
-/// A member of an order with its unit, as in "depth 5 to 30 m".
+/// A limit that an order sets, as in "depth 5 to 30 m".
 fn limit(name: &str, value: &Value) -> String {
-    let units = [("_bps", "bit/s"), ("_m", "m"), ("_s", "s")];
-    let unit = units.into_iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, unit)));
-    let (name, unit) = unit.map_or((name, String::new()), |(name, unit)| (name, format!(" {unit}")));
-    let said = match value {
-        Value::Array(ends) if ends.len() == 2 && ends.iter().all(Value::is_number) => {
-            format!("{} to {}", number(&ends[0]), number(&ends[1]))
-        }
-        Value::String(text) => text.clone(),
-        other => number(other),
-    };
     // The vehicle counts both from the moment at which it takes the limits.
-    let since = if ["distance", "time"].contains(&name) { " since this order" } else { "" };
-    format!("{} {said}{unit}{since}", name.replace('_', " "))
+    let since = if ["distance_m", "time_s"].contains(&name) { " since this order" } else { "" };
+    member_in_words(name, value) + since
 }
 
-/// A number without a fraction of 0.
-fn number(value: &Value) -> String {
-    value.as_f64().map_or_else(|| value.to_string(), |number| number.to_string())
+/// A length or the range of two, one figure where both are the same for people.
+pub(super) fn metres(least_m: f64, most_m: f64) -> String {
+    let [least, most] = [least_m, most_m].map(|m| format!("{m:.1}"));
+    if least == most { format!("{least} m") } else { format!("{least} to {most} m") }
 }
 
 /// The ends of an interval of areas for people.

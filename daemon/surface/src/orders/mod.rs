@@ -5,6 +5,7 @@ mod places;
 mod record;
 mod settings;
 mod vehicle;
+mod words;
 
 pub use changes::OrderChanges;
 pub(crate) use places::hundredths;
@@ -17,6 +18,8 @@ pub use vehicle::{
     AgainOrder, BudgetOrder, CONSTRAINT_NAMES, ConstraintsAction, ConstraintsOrder, ExemplarAction, ExemplarOrder,
     RestoreOrder, SharesOrder, TakeOverOrder, UtilityOrder,
 };
+pub(crate) use words::name_and_unit;
+pub use words::{member_in_words, value_in_words};
 
 use scenecast_protocol::directive::{Constraints, Slot};
 

@@ -1,7 +1,7 @@
 //! Requests in words, for the log of the mission.
 
 use super::SurfaceRequest;
-use crate::orders::{ExemplarAction, LabelOrder, OrderChanges};
+use crate::orders::{ExemplarAction, LabelOrder, OrderChanges, member_in_words, name_and_unit};
 use crate::{LimitsOrder, LogKind};
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::wire::Address;
@@ -99,7 +99,7 @@ fn utility(weights: &BTreeMap<u8, f64>, (exploration, curiosity): (f64, f64)) ->
 /// The limits that an order names, those that it removes last.
 fn limits_named(order: &OrderChanges<LimitsOrder>) -> String {
     let removed: Vec<String> =
-        order.named().iter().filter(|(_, v)| v.is_null()).map(|(name, _)| words_and_unit(name).0).collect();
+        order.named().iter().filter(|(_, v)| v.is_null()).map(|(name, _)| name_and_unit(name).0).collect();
     let stated = Some(members(order.named())).filter(|_| removed.len() < order.named().len());
     let removed = (!removed.is_empty()).then(|| format!("removed: {}", removed.join(", ")));
     stated.into_iter().chain(removed).collect::<Vec<_>>().join("; ")
@@ -109,37 +109,8 @@ fn limits_named(order: &OrderChanges<LimitsOrder>) -> String {
 fn members(order: &impl serde::Serialize) -> String {
     let value = serde_json::to_value(order).unwrap_or_default();
     let stated = value.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
-    let stated: Vec<String> = stated.map(|(name, value)| member(name, value)).collect();
+    let stated: Vec<String> = stated.map(|(name, value)| member_in_words(name, value)).collect();
     if stated.is_empty() { "none".to_owned() } else { stated.join(", ") }
-}
-
-/// A member in words: "depth 2 to 25 m".
-fn member(name: &str, value: &Value) -> String {
-    let (name, unit) = words_and_unit(name);
-    let value = match value.as_array().map(Vec::as_slice) {
-        Some([low, high]) if unit.is_some() => match (low.is_null(), high.is_null()) {
-            (false, false) => format!("{} to {}", plain(low), plain(high)),
-            (true, _) => format!("at most {}", plain(high)),
-            (_, true) => format!("at least {}", plain(low)),
-        },
-        _ => plain(value),
-    };
-    [Some(name), Some(value), unit.map(str::to_owned)].into_iter().flatten().collect::<Vec<_>>().join(" ")
-}
-
-/// The words of a member's name, and the unit that ends it.
-fn words_and_unit(name: &str) -> (String, Option<&'static str>) {
-    let unit = ["m", "s"].into_iter().find(|unit| name.ends_with(&format!("_{unit}")) && !name.ends_with("_per_s"));
-    let words = unit.map_or(name, |unit| name.trim_end_matches(unit)).trim_end_matches('_');
-    (words.replace('_', " "), unit)
-}
-
-/// A value without quotation marks, and a whole number without decimals.
-fn plain(value: &Value) -> String {
-    match value.as_f64() {
-        Some(number) => number.to_string(),
-        None => value.to_string().replace('"', ""),
-    }
 }
 
 #[cfg(test)]
