@@ -5,7 +5,7 @@ mod memory;
 
 use std::collections::BTreeMap;
 
-pub use in_step::in_step;
+pub use in_step::{in_step, update_in_step};
 pub use memory::TopicMemory;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! What the mapper keeps of each cell beside the scene model: its depth, its last sight, and what the map has of it.
 
 use crate::MapChanges;
-use scene_model::publish::{PublishedCell, in_step};
+use scene_model::publish::{PublishedCell, in_step, update_in_step};
 use scenecast_config::Config;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, Cell, LayerDescriptor, LayerId};
 use serde::{Deserialize, Serialize};
@@ -49,16 +49,9 @@ impl Cells {
     /// as it is.
     pub(super) fn take<'a>(&mut self, map: &'a [PublishedCell], t_s: f64, scales: &LayerScales) -> CellChanges<'a> {
         let mut changes = CellChanges::default();
-        let mut unseen = Vec::new();
-        for (shown, record) in in_step(self.0.iter_mut(), map.iter(), |shown| (shown.y, shown.x)) {
-            match record {
-                Some(record) => record.take(shown, t_s, scales, &mut changes),
-                None => unseen.push(shown),
-            }
-        }
-        for shown in unseen {
-            self.0.entry((shown.y, shown.x)).or_default().take(shown, t_s, scales, &mut changes);
-        }
+        let fresh = |_: &&PublishedCell| CellRecord::default();
+        let update = |record: &mut CellRecord, shown| record.take(shown, t_s, scales, &mut changes);
+        update_in_step(&mut self.0, map, |shown| (shown.y, shown.x), fresh, update);
         changes
     }
 

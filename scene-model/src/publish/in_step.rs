@@ -1,5 +1,7 @@
 //! Two lists of cells in the same order, read side by side.
 
+use std::collections::BTreeMap;
+
 /// Pairs each item with the entry of its place, `None` if there is none. Both lists are sorted by place; an entry pairs once.
 ///
 /// ```
@@ -21,4 +23,25 @@ pub fn in_step<'a, T, V>(
         let found = entries.next_if(|(at, _)| **at == wanted).map(|(_, value)| value);
         (item, found)
     })
+}
+
+/// Updates the entry of each item's place; a place without one gets that of `fresh`. Both are sorted by place.
+pub fn update_in_step<T, V>(
+    entries: &mut BTreeMap<(i32, i32), V>,
+    items: impl IntoIterator<Item = T>,
+    place: impl Fn(&T) -> (i32, i32),
+    fresh: impl Fn(&T) -> V,
+    mut update: impl FnMut(&mut V, T),
+) {
+    let mut missing = Vec::new();
+    for (item, entry) in in_step(entries.iter_mut(), items, &place) {
+        match entry {
+            Some(entry) => update(entry, item),
+            None => missing.push(item),
+        }
+    }
+    for item in missing {
+        let entry = entries.entry(place(&item)).or_insert_with(|| fresh(&item));
+        update(entry, item);
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::in_step;
+use super::{in_step, update_in_step};
 use crate::topics::{FlatCell, TopicId};
 
 /// Time in which a vote loses all but 1/e of its weight, seconds.
@@ -64,17 +64,8 @@ impl TopicMemory {
         let passed_s = (t_s - self.last_s.replace(t_s).unwrap_or(t_s)).clamp(0.0, MAX_STEP_S);
         let kept = (-passed_s / MEMORY_S).exp() as f32;
         let alive: BTreeSet<TopicId> = cells.iter().map(|cell| cell.topic).collect();
-        let mut fresh = Vec::new();
-        for (cell, memory) in in_step(&mut self.cells, cells, place) {
-            match memory {
-                Some(memory) => memory.learn(cell, kept, &alive),
-                None => fresh.push(cell),
-            }
-        }
-        for cell in fresh {
-            let fresh = || CellMemory { shown: cell.topic, votes: Vec::new(), maps: 0.0 };
-            self.cells.entry(place(&cell)).or_insert_with(fresh).learn(cell, kept, &alive);
-        }
+        let fresh = |cell: &&FlatCell| CellMemory { shown: cell.topic, votes: Vec::new(), maps: 0.0 };
+        update_in_step(&mut self.cells, cells, place, fresh, |memory, cell| memory.learn(cell, kept, &alive));
     }
 
     /// Returns the map, sorted by (y, x), with the remembered topic of each cell.

@@ -130,7 +130,7 @@ fn a_band_that_is_sent_again_is_up_to_date() {
 }
 
 #[test]
-fn a_level_that_is_not_known_any_more_reaches_a_layer_that_rests() {
+fn a_level_no_longer_known_reaches_a_layer_that_rests() {
     let mut vehicle = vehicle();
     let depth = |vehicle: &mut Vehicle, level: u8| {
         let layers = [(LayerId::DEPTH, vec![(FINE, level)])].into();

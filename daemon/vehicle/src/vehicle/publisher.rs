@@ -265,23 +265,26 @@ impl MapPublisher {
         }
     }
 
-    /// Gives the link the selected ones of the cells of a band, and those that are no longer known.
-    fn set_band(&self, id: LayerId, mut cells: Vec<(Cell, f64)>, link: &mut VehicleLink, now: Instant) {
-        let sent = sent_of(link, id);
-        cells.retain(|&(cell, quantity)| quantity.is_nan() || self.is_sent(sent, cell));
-        if !cells.is_empty() {
-            link.set_layer(id, cells, now);
-        }
+    fn set_band(&self, id: LayerId, cells: Vec<(Cell, f64)>, link: &mut VehicleLink, now: Instant) {
+        let cells = self.sent_cells(id, cells, f64::is_nan, link);
+        link.set_layer(id, cells, now);
     }
 
-    /// Gives the link the selected ones of the cells of a layer, and those that are no longer known.
     fn set_levels(&self, id: LayerId, cells: impl Iterator<Item = (Cell, u8)>, link: &mut VehicleLink, now: Instant) {
-        let sent = sent_of(link, id);
-        let cells: Vec<(Cell, u8)> =
-            cells.filter(|&(cell, level)| level == UNEXPLORED || self.is_sent(sent, cell)).collect();
-        if !cells.is_empty() {
-            link.set_levels(id, cells, now);
-        }
+        let cells = self.sent_cells(id, cells, |level| level == UNEXPLORED, link);
+        link.set_levels(id, cells, now);
+    }
+
+    /// The selected ones of the cells of a layer, and those that are no longer known.
+    fn sent_cells<T: Copy>(
+        &self,
+        id: LayerId,
+        cells: impl IntoIterator<Item = (Cell, T)>,
+        is_unknown: impl Fn(T) -> bool,
+        link: &VehicleLink,
+    ) -> Vec<(Cell, T)> {
+        let sent = link.layers().find(|layer| layer.id() == id).map(LayerSource::target);
+        cells.into_iter().filter(|&(cell, value)| is_unknown(value) || self.is_sent(sent, cell)).collect()
     }
 
     /// Whether a cell is among the selected ones, or one of `sent`: what the link has of the map or of the layer.
@@ -300,9 +303,4 @@ impl MapPublisher {
             self.tree_at = Some(now);
         }
     }
-}
-
-/// What the link has of a layer.
-fn sent_of(link: &VehicleLink, id: LayerId) -> Option<&LabelGrid> {
-    link.layers().find(|layer| layer.id() == id).map(LayerSource::target)
 }
