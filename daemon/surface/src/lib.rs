@@ -10,6 +10,7 @@ mod command;
 mod command_tests;
 mod exemplar_cache;
 pub mod fit;
+mod floor_views;
 mod in_force;
 mod label_book;
 mod layers;
@@ -43,6 +44,7 @@ pub use command::{
     CommandRequest, OrderKind,
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
+pub use floor_views::{FloorPlace, FloorViews};
 pub use label_book::LabelBook;
 pub use layers::cell_layers;
 pub use link_meter::LinkMeter;

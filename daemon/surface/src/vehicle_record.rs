@@ -3,6 +3,7 @@
 use super::annotations::AnnotationRefusal;
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
+use super::floor_views::FloorViews;
 use super::label_book::LabelBook;
 use super::map_changes::{Corrections, LabelGains};
 use super::record::{EarlierMap, StoredLabel};
@@ -66,6 +67,7 @@ pub struct VehicleRecord {
     /// The settings that were ordered, and those in force.
     pub settings: SettingsRecord,
     pub exemplars: ExemplarCache,
+    pub floor: FloorViews,
     /// Reported positions in the map frame.
     pub track: Track,
     /// How its camera frames were placed on the map.
@@ -121,6 +123,7 @@ impl VehicleRecord {
             destination: SentOrder::default(),
             settings: SettingsRecord::default(),
             exemplars: ExemplarCache::default(),
+            floor: FloorViews::default(),
             track: Track::default(),
             registration: RegistrationRecord::default(),
             run: 1,
@@ -140,6 +143,7 @@ impl VehicleRecord {
     /// The vehicle has begun another run, with a map of its own.
     pub fn begin_run(&mut self) {
         self.run += 1;
+        self.floor = FloorViews::default();
         self.gains = LabelGains::default();
         self.classes.clear();
     }

@@ -80,6 +80,8 @@ pub struct VehicleMemory {
     pub(crate) in_force: Vec<Vec<u8>>,
     /// By label, in the order of arrival.
     pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
+    /// By their middle.
+    pub(crate) floor: BTreeMap<(i32, i32), StoredImage>,
     /// Serial number of requests and the open one, by label.
     pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
     pub(crate) labels: LabelBook,
@@ -266,6 +268,8 @@ impl VehicleMemory {
                     self.exemplars.remove(label);
                 }
             }
+            VehicleEvent::Floor(view) => _ = self.floor.insert(view.middle_dm, view.clone()),
+            VehicleEvent::FloorGone(middle_dm) => _ = self.floor.remove(middle_dm),
             VehicleEvent::Request { label, serial, open } => {
                 match (*serial, *open) {
                     (0, None) => self.requests.remove(label),
@@ -357,6 +361,7 @@ impl VehicleMemory {
         for (&label, images) in &self.exemplars {
             all.extend(images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }));
         }
+        all.extend(self.floor.values().cloned().map(VehicleEvent::Floor));
         let named = |(&label, book): (&u8, &StoredLabel)| VehicleEvent::Label { label, book: book.clone() };
         all.extend(self.labels.iter().map(named));
         all.extend(self.notes.iter().cloned().map(VehicleEvent::Note));
