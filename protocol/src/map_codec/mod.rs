@@ -10,7 +10,6 @@ mod file;
 #[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
 mod grow;
 mod header;
-mod lattice;
 #[allow(clippy::indexing_slicing)] // Cells of its own patch.
 mod patch;
 mod png;
@@ -25,8 +24,7 @@ pub(crate) use chunk::encode_quickly;
 pub use chunk::{ChunkPatch, Codec, decode, encode, encode_every, patch, trace};
 pub use context::{Decision, training};
 pub use file::{ChunkFile, ChunkFileError};
-pub use lattice::Stride;
-pub use patch::{DecodeError, MapChunk};
+pub use patch::{DecodeError, MapChunk, Stride};
 pub use png::restored_png;
 pub use raster::{Deflate, LabelRaster, RasterPngError};
 pub use series::encode_all;

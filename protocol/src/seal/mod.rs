@@ -17,15 +17,13 @@
 
 mod ascon;
 mod key;
-mod offer;
 mod session;
 mod text;
 
 #[cfg(test)]
 mod tests;
 
-pub use key::{HeldKey, LinkKey, MissionKey, VehicleKey};
-pub use offer::KeyOffer;
+pub use key::{HeldKey, KeyOffer, LinkKey, MissionKey, VehicleKey};
 pub use session::{Direction, SessionKey};
 pub use text::{KeyError, KeyFile};
 
