@@ -10,7 +10,6 @@ mod compass;
 mod consensus;
 mod correlate;
 mod evidence;
-mod fourier;
 mod geometry;
 mod graph;
 #[cfg(test)]
@@ -19,7 +18,6 @@ mod kept_frames;
 mod odometry;
 mod pair;
 mod plane;
-mod pose;
 mod refine;
 mod registrar;
 #[cfg(test)]
@@ -30,10 +28,10 @@ mod similarity;
 mod skerki_tests;
 mod tiles;
 
+pub use crate::similarity::FramePose;
 pub use camera_image::CameraImage;
 pub use evidence::{Evidence, Tally};
 pub use geometry::{CameraFinding, CameraGeometry, GeometryCheck};
 pub use graph::FrameGraph;
-pub use pose::FramePose;
 pub use registrar::{FrameInput, Placed, Registrar};
 pub use saved_state::RestoreError;
