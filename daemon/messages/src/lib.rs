@@ -20,7 +20,6 @@ pub mod contents;
 mod definition;
 mod field;
 mod message;
-mod type_hash;
 
 pub mod builtin_interfaces;
 pub mod diagnostic_msgs;

@@ -6,7 +6,6 @@ mod carrier;
 mod conformance_tests;
 #[cfg(test)]
 mod discovery_tests;
-mod energy;
 mod fidelity;
 mod frames_log;
 mod instruments;

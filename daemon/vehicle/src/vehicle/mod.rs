@@ -8,7 +8,6 @@ mod band_tests;
 mod bands;
 mod durable;
 mod evidence;
-mod frame_clock;
 mod gallery;
 mod guidance;
 #[cfg(test)]
