@@ -39,6 +39,8 @@ section! {
         /// Name of the surface, at most 12 letters and digits, by which a vehicle names it to another surface with the same
         /// key. Empty: the name of the computer.
         name: String = String::new(), ANY, [Asv Scenario];
+        /// People, ship and cruise, as reports name and cite them, such as "A. Berg, RV Alkor, cruise AL512".
+        credit: String = String::new(), ANY, [Asv Scenario];
         /// What the surface does when a vehicle has lost the orders that it had received. ask: it shows them, and sends them
         /// again when an operator confirms it; auto: it sends them again by itself. An order to resume is never sent again.
         restore: RestoreOrders = RestoreOrders::Ask, ANY, [Asv Scenario];

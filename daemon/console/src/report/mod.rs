@@ -5,6 +5,7 @@ mod areas;
 mod chart;
 mod dive;
 mod doubts;
+mod effects;
 mod extent;
 mod frames;
 mod gaps;

@@ -2,6 +2,7 @@
 
 use super::areas::ClassArea;
 use super::dive::{Dive, DiveVehicle};
+use super::effects::Effect;
 use super::orders::said;
 use super::{Escaped, doubts, extent, images, map_figure, summary, words};
 use scenecast_core::utc_text;
@@ -33,6 +34,9 @@ impl Dive {
             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
              <title>Dive report: {mission}</title><style>{STYLE}</style></head><body>\n<h1>Dive report: {mission}</h1>\n"
         );
+        if let Some(credit) = self.credit() {
+            let _ = writeln!(page, "<p>{}</p>", Escaped(credit));
+        }
         if self.state.vehicles.is_empty() {
             page += "<p>The surface knew no vehicle.</p>\n";
         }
@@ -43,6 +47,11 @@ impl Dive {
         self.events_table(&mut page);
         self.origin_of_figures(&mut page);
         page
+    }
+
+    /// Who made the dive, as they want to be cited; `None` if nobody said it.
+    fn credit(&self) -> Option<&str> {
+        self.settings.text("surface.credit").filter(|credit| !credit.is_empty())
     }
 
     /// Settings, versions, and how to cite.
@@ -64,6 +73,7 @@ impl Dive {
             true => ", of which these records do not say whether its motion and its images were real".to_owned(),
             false => made_up.iter().map(|what| format!(", {what}")).collect(),
         };
+        let credit = self.credit().map_or_else(String::new, |credit| format!("{}: ", Escaped(credit)));
         let own = self.vehicles().filter(|(_, vehicle)| !vehicle.own.track.is_empty()).count();
         let own = if own > 0 { " and those of the vehicles themselves" } else { "" };
         let origin =
@@ -71,7 +81,7 @@ impl Dive {
         let _ = writeln!(
             page,
             "<h2>How this was made</h2>\n<p>By {program} from the records of the surface{own}, run {run}, recorded from {begin} to {end}. \
-             The map is the operator's: what had arrived over the link. Areas are counts of cells. Names of classes are those at the end.</p>\n{}<h2>How to cite</h2>\n<p>Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
+             The map is the operator's: what had arrived over the link. Areas are counts of cells. Names of classes are those at the end.</p>\n{}<h2>How to cite</h2>\n<p>{credit}Mission \u{201c}{mission}\u{201d}, vehicle {}, {begin} to {end}: map of the \
              sea floor by an unsupervised scene model{made_up}{origin}, run {run}, recorded by {}{reported}.</p>\n</body></html>",
             self.files_table(),
             Escaped(&names.join(", ")),
@@ -127,6 +137,7 @@ impl Dive {
         self.orders_table(page, state, vehicle);
         self.in_force(page, state, vehicle);
         self.steering(page, state, vehicle);
+        self.effects_table(page, state, vehicle);
         self.link(page, state, vehicle);
     }
 
@@ -188,6 +199,9 @@ impl Dive {
                 });
                 json!({ "slot": slot, "version": version, "by": by, "ordered": ordered, "steps": steps.collect::<Vec<_>>() })
             });
+            let effects = self.effects(state, vehicle).into_iter().map(|Effect { order: (slot, version), from_s, to_s, told }| {
+                json!({ "slot": slot, "version": version, "from": utc_text(from_s), "to": utc_text(to_s), "told": told })
+            });
             json!({
                 "name": state.name,
                 "summary": summary::summary(self, state, vehicle).into_iter().flat_map(|(_, told)| told).collect::<Vec<_>>(),
@@ -196,6 +210,7 @@ impl Dive {
                 "cell_m": vehicle.cell_m,
                 "classes": classes.collect::<Vec<_>>(),
                 "orders": orders.collect::<Vec<_>>(),
+                "effects": effects.collect::<Vec<_>>(),
                 "exemplars": vehicle.exemplars.len(),
                 "track": vehicle.path().iter().map(|point| json!({
                     "utc": utc_text(point.at_s), "east_m": point.east_m, "north_m": point.north_m,

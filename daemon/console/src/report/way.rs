@@ -45,7 +45,7 @@ pub(super) fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
     let planner = all.settings.get("survey.planner").and_then(Value::as_str).unwrap_or(defaults.survey.planner.name());
     let way = match planner == PlannerKind::Lawnmower.name() {
         true => "in straight legs".to_owned(),
-        false => format!("in straight legs and, once a utility was ordered, by the planner {planner}"),
+        false => format!("in straight legs and, once weights were ordered, by the planner {planner}"),
     };
     format!(
         "{images}By its settings it was to survey {} m above the sea floor at {} m/s {way}, with camera images whose pixels are {} m \

@@ -276,14 +276,16 @@ pub(super) fn interval(interval_m2: Option<(f64, f64)>) -> String {
 pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
     match classes.iter().any(|class| class.interval_m2.is_some()) {
         true => {
-            "Classes are groups that the scene model found without being taught; no person has verified them. The intervals come from the \
+            "A class is a label of the scene model, with the labels that people merged into it: a group that the model found without being \
+             taught, and that no person has verified. The intervals come from the \
              model's own confidence in each cell, which is known to a quarter and taken as the probability that the cell's label is right. A \
              label that is wrong is taken to be one of the others, in proportion to their areas. Squares of 4 x 4 cells are taken to be right \
              or wrong as a whole. Where no confidence arrived, all is taken to be possible. The intervals do not have the error of positions, \
              sea floor that nobody has seen, or classes that the model does not tell apart."
         }
         false => {
-            "Classes are groups that the scene model found without being taught; no person has verified them. The surface has received no \
+            "A class is a label of the scene model, with the labels that people merged into it: a group that the model found without being \
+             taught, and that no person has verified. The surface has received no \
              confidence, so the intervals are not known."
         }
     }
