@@ -12,20 +12,14 @@ mod correlate;
 mod evidence;
 mod geometry;
 mod graph;
-#[cfg(test)]
-mod graph_tests;
 mod kept_frames;
 mod odometry;
 mod pair;
 mod plane;
 mod refine;
 mod registrar;
-#[cfg(test)]
-mod registrar_tests;
 mod saved_state;
 mod similarity;
-#[cfg(test)]
-mod skerki_tests;
 mod tiles;
 
 pub use crate::similarity::FramePose;
@@ -35,3 +29,10 @@ pub use geometry::{CameraFinding, CameraGeometry, GeometryCheck};
 pub use graph::FrameGraph;
 pub use registrar::{FrameInput, Placed, Registrar};
 pub use saved_state::RestoreError;
+
+#[cfg(test)]
+mod graph_tests;
+#[cfg(test)]
+mod registrar_tests;
+#[cfg(test)]
+mod skerki_tests;

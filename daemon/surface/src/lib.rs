@@ -6,8 +6,6 @@
 mod annotations;
 mod assemble;
 mod command;
-#[cfg(test)]
-mod command_tests;
 mod exemplar_cache;
 pub mod fit;
 mod in_force;
@@ -60,3 +58,6 @@ pub use snapshot::{MissionFacts, Snapshot, Truth, measured_origin, principal_inf
 pub use surface::{Surface, SurfaceOutput};
 pub use track::{RegistrationRecord, Track};
 pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord};
+
+#[cfg(test)]
+mod command_tests;

@@ -17,8 +17,6 @@ mod png;
 mod raster;
 #[allow(clippy::indexing_slicing)] // Cells of a row that it has counted.
 mod series;
-#[cfg(test)]
-mod tests;
 
 pub(crate) use chunk::encode_quickly;
 pub use chunk::{ChunkPatch, Codec, decode, encode, encode_every, patch, trace};
@@ -33,3 +31,6 @@ pub use series::encode_all;
 pub const MAX_PATCH_CELLS: usize = 1 << 16;
 /// The most cells along one side of a patch.
 pub const MAX_PATCH_SIDE: usize = 1 << 10;
+
+#[cfg(test)]
+mod tests;

@@ -20,9 +20,6 @@ mod key;
 mod session;
 mod text;
 
-#[cfg(test)]
-mod tests;
-
 pub use key::{HeldKey, KeyOffer, LinkKey, MissionKey, VehicleKey};
 pub use session::{Direction, SessionKey};
 pub use text::{KeyError, KeyFile};
@@ -34,3 +31,6 @@ pub type Tag = [u8; TAG_BYTES];
 
 /// The length of a [`Tag`] in bytes.
 pub const TAG_BYTES: usize = 8;
+
+#[cfg(test)]
+mod tests;
