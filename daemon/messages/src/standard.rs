@@ -1,6 +1,6 @@
 //! The standard messages of ROS 2, and `grid_map_msgs` of ANYbotics, by package. `sensor_msgs` has a file of its own.
 
-/// The package `builtin_interfaces`.
+/// The package `builtin_interfaces`: times and spans of time.
 pub mod builtin_interfaces {
     use crate::message::messages;
 
@@ -41,7 +41,7 @@ pub mod builtin_interfaces {
     }
 }
 
-/// The package `std_msgs`.
+/// The package `std_msgs`: headers, texts, colours and arrays.
 pub mod std_msgs {
     use crate::builtin_interfaces::Time;
     use crate::message::messages;
@@ -190,7 +190,7 @@ pub mod geometry_msgs {
     }
 }
 
-/// The package `nav_msgs`.
+/// The package `nav_msgs`: occupancy grids, odometry and paths.
 pub mod nav_msgs {
     use crate::builtin_interfaces::Time;
     use crate::geometry_msgs::{Pose, PoseStamped, PoseWithCovariance, TwistWithCovariance};
@@ -272,7 +272,7 @@ pub mod grid_map_msgs {
     }
 }
 
-/// The package `diagnostic_msgs`.
+/// The package `diagnostic_msgs`: the state of the parts of a robot.
 pub mod diagnostic_msgs {
     use crate::Byte;
     use crate::message::messages;
@@ -310,7 +310,7 @@ pub mod diagnostic_msgs {
     }
 }
 
-/// The package `rcl_interfaces`.
+/// The package `rcl_interfaces`: lines of a log.
 pub mod rcl_interfaces {
     use crate::builtin_interfaces::Time;
     use crate::message::messages;
@@ -338,7 +338,7 @@ pub mod rcl_interfaces {
     }
 }
 
-/// The package `rosgraph_msgs`.
+/// The package `rosgraph_msgs`: the clock of a simulation or of a recording.
 pub mod rosgraph_msgs {
     use crate::builtin_interfaces::Time;
     use crate::message::messages;
@@ -353,7 +353,7 @@ pub mod rosgraph_msgs {
     }
 }
 
-/// The package `tf2_msgs`.
+/// The package `tf2_msgs`: transforms between frames of reference.
 pub mod tf2_msgs {
     use crate::geometry_msgs::TransformStamped;
     use crate::message::messages;
