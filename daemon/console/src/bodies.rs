@@ -129,7 +129,7 @@ pub struct LogList {
 pub struct LogLine {
     /// One more than that of the entry before.
     pub number: u64,
-    /// Mission time.
+    /// Mission time of the entry, seconds.
     pub at_s: f64,
     /// The same time in UTC by the clock of the surface's computer (RFC 3339).
     pub utc: String,
@@ -139,7 +139,7 @@ pub struct LogLine {
     pub kind: String,
     /// The principal who caused it; null for the surface and the vehicle.
     pub by: Option<String>,
-    /// One line for people.
+    /// The entry in one line, for people.
     pub text: String,
 }
 

@@ -10,7 +10,6 @@ mod bodies;
 pub mod client;
 mod export;
 mod http;
-mod layer_text;
 mod recording;
 mod replay;
 pub mod report;
@@ -18,7 +17,6 @@ mod tiles;
 
 pub use export::{ExportError, MapFormat};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
-pub use layer_text::layer_text;
-pub use recording::Recording;
+pub use recording::{Recording, layer_text};
 pub use replay::Replay;
 pub use tiles::TiledMap;

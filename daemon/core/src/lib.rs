@@ -13,11 +13,11 @@ mod output;
 pub mod palette;
 mod principal;
 mod program;
-mod reminder;
 pub mod tuning_table;
-mod usbl_line;
 mod utc;
 
+pub use crate::nmea::{ModemAddress, UsblLine};
+pub use crate::output::Reminder;
 pub use geodesy::{
     Area, BodyOffset, LatLon, MAX_DISTANCE_M, PlaceError, TangentPlane, fence_of, outline_of, place_of, wrap_rad,
 };
@@ -29,6 +29,4 @@ pub use modem_facts::{
 pub use output::{Takes, UserError, one_line, printable, write_error, write_or_exit};
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use program::{program, set_program};
-pub use reminder::Reminder;
-pub use usbl_line::{ModemAddress, UsblLine};
 pub use utc::utc_text;

@@ -1,4 +1,4 @@
-//! NMEA 0183 sentences of receivers and compasses.
+//! NMEA 0183 sentences of receivers and compasses, and a position as an ultra-short baseline (USBL) head reports it.
 //!
 //! ```text
 //! $ talker(2) formatter(3) , field , field ... * checksum(2 hex digits: XOR of all between $ and *)
@@ -252,6 +252,22 @@ pub fn place_fields(place: LatLon) -> String {
     let ns = if place.lat_deg < 0.0 { 'S' } else { 'N' };
     let ew = if place.lon_deg < 0.0 { 'W' } else { 'E' };
     format!("{lat:02}{lat_min:08.5},{ns},{lon:03}{lon_min:08.5},{ew}")
+}
+
+/// Address of a modem in the water, as its make counts them.
+pub type ModemAddress = u8;
+
+/// The position of another modem as a USBL head measured it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UsblLine {
+    pub remote: ModemAddress,
+    pub range_m: Option<f64>,
+    /// Clockwise from north, rad, -pi..=pi, and above the horizontal, rad; `None` if only the range is good.
+    pub direction_rad: Option<(f64, f64)>,
+    /// Expected error of the position, metres; of directions alone, rad.
+    pub accuracy: f64,
+    /// How long ago it was measured, seconds.
+    pub age_s: f64,
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
-//! Images of the sea floor and their annotations, from files, and where their pixels are.
+//! Images of the sea floor, their annotations and their distances, from files, and where their pixels are.
 
 use crate::bag::Bag;
-use image::RgbImage;
+use image::{DynamicImage, RgbImage};
+use scene_model::project::DepthImage;
 use scenecast_config::read_regular;
 use scenecast_core::UserError;
 use scenecast_core::label_picture::{Indices, read_indices};
@@ -92,5 +93,33 @@ impl fmt::Display for FrameImage {
             Self::File(path) => write!(f, "{}", path.display()),
             Self::Bag(bag, number) => write!(f, "{bag:?}, image {number}"),
         }
+    }
+}
+
+/// A file of distances, and the units of its whole numbers in a metre.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthFile {
+    pub path: PathBuf,
+    pub units_per_m: f64,
+}
+
+impl DepthFile {
+    pub(crate) fn read(&self) -> Result<DepthImage, UserError> {
+        read_depth(&self.path, self.units_per_m)
+    }
+}
+
+/// Reads a depth image: a grey PNG of 16 bits with so many units a metre.
+///
+/// # Errors
+/// The file cannot be read, or is another image.
+pub fn read_depth(path: &Path, units_per_m: f64) -> Result<DepthImage, UserError> {
+    match read_image(path)? {
+        DynamicImage::ImageLuma16(depth) => {
+            let (width, height) = depth.dimensions();
+            let metres = depth.into_raw().into_iter().map(|units| (f64::from(units) / units_per_m) as f32).collect();
+            Ok(DepthImage { width, height, metres })
+        }
+        _ => Err(UserError::file(path, "a depth image is a grey PNG of 16 bits")),
     }
 }

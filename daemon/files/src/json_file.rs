@@ -13,7 +13,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 enum JsonError {
     #[error("it is empty")]
     Empty,
-    /// As [`scenecast_config::utf16_fault`] describes it.
+    /// It is in UTF-16, as [`scenecast_config::utf16_fault`] describes.
     #[error("{0}")]
     Utf16(String),
     #[error(transparent)]

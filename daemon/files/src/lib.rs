@@ -5,7 +5,6 @@
 mod bag;
 mod bag_recording;
 mod configured;
-mod depth_file;
 mod geojson;
 mod images;
 mod json_file;
@@ -16,13 +15,13 @@ mod recording;
 mod tum_recording;
 mod whole;
 
+pub use crate::images::{DepthFile, read_depth};
 pub use bag::Bag;
 pub use bag::stream::HOW_TO_RECOVER;
 pub use bag_recording::{BagTiming, BagTopics};
 pub use configured::{
     configured_calibration, configured_mounting, configured_recording, configured_vocabulary, open_bag, read_vocabulary,
 };
-pub use depth_file::{DepthFile, read_depth};
 pub use geojson::{AreaShape, CoordinateFrame, FenceShapes, read_areas, read_fence};
 pub use images::{FrameImage, own_scale_m, read_classes, read_image, unread_emptiness};
 pub use label_folder::{FolderItem, LabelFolder, read_class_names};

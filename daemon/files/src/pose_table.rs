@@ -60,7 +60,7 @@ pub(crate) struct Placed<T> {
     /// File and line, for people.
     pub(crate) line: u64,
     pub(crate) t_s: f64,
-    /// Metres east and north.
+    /// The place: metres east and north of the table's origin.
     pub(crate) at: [f64; 2],
     pub(crate) content: T,
 }

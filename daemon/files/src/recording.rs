@@ -1,7 +1,6 @@
 //! Recorded missions: images with their poses.
 
-use crate::depth_file::DepthFile;
-use crate::images::FrameImage;
+use crate::images::{DepthFile, FrameImage};
 use crate::pose_table::{Columns, Placed, PoseRow, PoseTableError, reachable_rows};
 use image::RgbImage;
 use scene_model::project::View;

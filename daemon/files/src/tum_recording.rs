@@ -4,8 +4,7 @@
 //! `rgb.txt` and `depth.txt` are lines `time file`, `groundtruth.txt` lines `time tx ty tz qx qy qz qw`: camera to
 //! world. Depth is a 16-bit PNG in units of 1/5000 m, 0 where there is no reading.
 
-use crate::depth_file::DepthFile;
-use crate::images::{FrameImage, read_image};
+use crate::images::{DepthFile, FrameImage, read_image};
 use crate::pose_table::{Placed, reachable_rows};
 use crate::recording::{RecordedFrame, Recording};
 use scene_model::project::CameraPose;

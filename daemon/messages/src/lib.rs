@@ -20,22 +20,17 @@ pub mod contents;
 mod definition;
 mod field;
 mod message;
-mod type_hash;
+mod standard;
 
-pub mod builtin_interfaces;
-pub mod diagnostic_msgs;
-pub mod geometry_msgs;
-pub mod grid_map_msgs;
-pub mod nav_msgs;
-pub mod rcl_interfaces;
-pub mod rosgraph_msgs;
 pub mod scenecast_msgs;
 pub mod sensor_msgs;
-pub mod std_msgs;
-pub mod tf2_msgs;
 
 pub use catalogue::{CATALOGUE, Entry};
 pub use cdr::{CdrError, decode, encode};
 pub use definition::{Constant, Definition, Field, Kind, Primitive};
 pub use field::Byte;
 pub use message::Message;
+pub use standard::{
+    builtin_interfaces, diagnostic_msgs, geometry_msgs, grid_map_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs,
+    std_msgs, tf2_msgs,
+};

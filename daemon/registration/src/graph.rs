@@ -2,8 +2,8 @@
 
 use crate::evidence::{Evidence, Step};
 use crate::pair::{Link, Match};
-use crate::pose::FramePose;
 use crate::registrar::{CHAIN_ALIKE, LOOPS_ALIKE, Placed};
+use crate::similarity::FramePose;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use scenecast_core::wrap_rad;
 use scenecast_protocol::coordinates::MapPoint;

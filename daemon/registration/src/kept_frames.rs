@@ -1,7 +1,7 @@
 //! Earlier frames, for closing loops: a bounded store.
 
 use crate::camera_image::Thumbnail;
-use crate::pose::FramePose;
+use crate::similarity::FramePose;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 

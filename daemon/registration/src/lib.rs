@@ -10,30 +10,29 @@ mod compass;
 mod consensus;
 mod correlate;
 mod evidence;
-mod fourier;
 mod geometry;
 mod graph;
-#[cfg(test)]
-mod graph_tests;
 mod kept_frames;
 mod odometry;
 mod pair;
 mod plane;
-mod pose;
 mod refine;
 mod registrar;
-#[cfg(test)]
-mod registrar_tests;
 mod saved_state;
 mod similarity;
-#[cfg(test)]
-mod skerki_tests;
 mod tiles;
 
+pub use crate::similarity::FramePose;
 pub use camera_image::CameraImage;
 pub use evidence::{Evidence, Tally};
 pub use geometry::{CameraFinding, CameraGeometry, GeometryCheck};
 pub use graph::FrameGraph;
-pub use pose::FramePose;
 pub use registrar::{FrameInput, Placed, Registrar};
 pub use saved_state::RestoreError;
+
+#[cfg(test)]
+mod graph_tests;
+#[cfg(test)]
+mod registrar_tests;
+#[cfg(test)]
+mod skerki_tests;

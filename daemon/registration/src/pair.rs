@@ -3,9 +3,8 @@
 use crate::camera_image::Scales;
 use crate::consensus::{Agreed, Before, ExpectedRelief, agree};
 use crate::correlate::{Correlator, Peak};
-use crate::pose::FramePose;
 use crate::refine::{Fit, Reference};
-use crate::similarity::Similarity;
+use crate::similarity::{FramePose, Similarity};
 use crate::tiles::match_tiles;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use scenecast_protocol::coordinates::MapPoint;

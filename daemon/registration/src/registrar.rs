@@ -8,7 +8,7 @@ use crate::evidence::{Evidence, Loop, Step, Tally};
 use crate::kept_frames::{KeptFrame, KeptFrames};
 use crate::odometry::{OdometryFilter, Seen};
 use crate::pair::{Attempts, Expected, Gates, Link, PLACED_SPREAD};
-use crate::pose::FramePose;
+use crate::similarity::FramePose;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use scenecast_core::wrap_rad;
 use scenecast_protocol::coordinates::MapPoint;

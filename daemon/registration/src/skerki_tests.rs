@@ -5,7 +5,7 @@
 use crate::camera_image::{CameraImage, FlatField, Thumbnail};
 use crate::consensus::ExpectedRelief;
 use crate::pair::{Attempts, Expected, Gates, Match};
-use crate::pose::FramePose;
+use crate::similarity::FramePose;
 use nalgebra::Vector2;
 use scenecast_protocol::coordinates::MapPoint;
 use std::path::PathBuf;

@@ -2,11 +2,6 @@
 
 mod baseline;
 mod carrier;
-#[cfg(test)]
-mod conformance_tests;
-#[cfg(test)]
-mod discovery_tests;
-mod energy;
 mod fidelity;
 mod frames_log;
 mod instruments;
@@ -21,8 +16,6 @@ pub mod planning_bench;
 mod quality;
 mod report;
 mod script;
-#[cfg(test)]
-mod storm_tests;
 mod virtual_time;
 mod world;
 
@@ -39,3 +32,10 @@ pub use report::{Report, report};
 pub use scenecast_worlds::View;
 pub use virtual_time::VirtualTime;
 pub use world::{Truth, World, true_classes};
+
+#[cfg(test)]
+mod conformance_tests;
+#[cfg(test)]
+mod discovery_tests;
+#[cfg(test)]
+mod storm_tests;

@@ -19,27 +19,24 @@
 
 mod dds;
 mod inbox;
-mod names;
 mod node;
 mod stop;
-mod subscriptions;
 #[cfg(feature = "surface")]
 mod surface;
 mod transport;
 mod vehicle;
-mod vehicle_map;
 #[cfg(feature = "zenoh")]
 mod zenoh;
 #[cfg(not(feature = "zenoh"))]
 #[path = "zenoh/absent.rs"]
 mod zenoh;
 
+pub use crate::node::topic;
+pub use crate::vehicle::VehicleMap;
 pub use inbox::{Inbox, Received};
-pub use names::topic;
 pub use node::{Publisher, RosNode};
 pub use scenecast_messages::contents::valid_part;
 #[cfg(feature = "surface")]
 pub use surface::{SurfaceOutlet, start_surface};
 pub use transport::{Peers, Qos, Transport};
 pub use vehicle::{VehicleOutlet, VehicleView, start_vehicle};
-pub use vehicle_map::VehicleMap;

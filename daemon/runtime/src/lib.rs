@@ -6,13 +6,9 @@ mod clock;
 mod doctor;
 mod durable;
 mod equipment;
-#[cfg(test)]
-mod fuzz_corpus_tests;
 #[cfg(feature = "surface")]
 mod instruments;
 mod journal;
-#[cfg(test)]
-mod kept_label_tests;
 mod labels;
 #[cfg(feature = "surface")]
 mod map_files;
@@ -82,3 +78,8 @@ pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result
     runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
     result
 }
+
+#[cfg(test)]
+mod fuzz_corpus_tests;
+#[cfg(test)]
+mod kept_label_tests;

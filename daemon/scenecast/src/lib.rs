@@ -2,6 +2,4 @@
 
 pub mod commands;
 #[cfg(feature = "rehearsal")]
-mod demo;
-#[cfg(feature = "rehearsal")]
 pub mod mission_record;

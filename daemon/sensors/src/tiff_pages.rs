@@ -21,7 +21,7 @@ const DATA: [(u16, u16); 2] = [(273, 279), (324, 325)];
 /// Bits of `NEW_SUBFILE_TYPE`: a reduced image, a mask.
 const NOT_WHOLE: usize = 1 | MASK;
 const MASK: usize = 4;
-/// Separate planes.
+/// The planar configuration 2: each band has a plane of its own.
 const PLANAR: usize = 2;
 /// Pages that are looked at.
 const MAX_PAGES: usize = 64;

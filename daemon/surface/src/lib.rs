@@ -6,14 +6,11 @@
 mod annotations;
 mod assemble;
 mod command;
-#[cfg(test)]
-mod command_tests;
 mod exemplar_cache;
 pub mod fit;
 mod floor_views;
 mod in_force;
 mod label_book;
-mod layers;
 mod link_meter;
 mod log;
 mod logging;
@@ -34,7 +31,6 @@ mod snapshot;
 pub mod state;
 mod surface;
 mod track;
-mod truth;
 mod vehicle_record;
 
 pub use annotations::{AnnotationRefusal, Annotations};
@@ -46,7 +42,6 @@ pub use command::{
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use floor_views::{FloorPlace, FloorViews};
 pub use label_book::LabelBook;
-pub use layers::cell_layers;
 pub use link_meter::LinkMeter;
 pub use log::{AUTOPILOT_SILENT, LogEntry, LogKind, MissionLog, NO_FAULT};
 pub use map_cells::{CellLayer, MapCaption, MapCells, tile_place};
@@ -58,11 +53,13 @@ pub use orders::{
     SettingsOrder, SharesOrder, TakeOverOrder, UtilityOrder, member_in_words, order_name, value_in_words,
 };
 pub use refusal::{OrderRefusal, Weighed};
-pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, former_labels, handle_request};
+pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, cell_layers, former_labels, handle_request};
 pub use scenecast_core::{ClientName, Giver, Principal, Role};
 pub use settings_record::SettingsRecord;
-pub use snapshot::{MissionFacts, Snapshot, measured_origin, principal_info, snapshot};
+pub use snapshot::{MissionFacts, Snapshot, Truth, measured_origin, principal_info, snapshot};
 pub use surface::{Surface, SurfaceOutput};
 pub use track::{RegistrationRecord, Track};
-pub use truth::Truth;
 pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord};
+
+#[cfg(test)]
+mod command_tests;

@@ -17,7 +17,7 @@ use crate::{
     RequestKind, SettingsOrder, Surface, order_name,
 };
 use described::describe;
-pub use maps::{archived_cells, former_labels};
+pub use maps::{archived_cells, cell_layers, former_labels};
 use scenecast_core::tuning_table::NoRow;
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Slot, SlotId};

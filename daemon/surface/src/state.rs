@@ -72,17 +72,17 @@ pub struct MissionState {
 pub struct TruthInfo {
     /// The western edge of the picture in the world frame, metres.
     pub west_m: f64,
-    /// The southern edge.
+    /// The southern edge in the world frame, metres.
     pub south_m: f64,
-    /// The eastern edge.
+    /// The eastern edge in the world frame, metres.
     pub east_m: f64,
-    /// The northern edge.
+    /// The northern edge in the world frame, metres.
     pub north_m: f64,
     /// The classes in the picture.
     pub classes: Vec<TrueClass>,
 }
 
-/// A true class.
+/// A true class of a simulated sea floor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct TrueClass {
     /// The value of its pixels.

@@ -41,7 +41,7 @@ pub struct LabelChanges {
 /// A camera frame that was mapped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenFrame {
-    /// Mission time, seconds.
+    /// Mission time at which it was taken, seconds.
     pub t_s: f64,
     /// The pose of the camera in the vehicle's map frame: by registration, where that is on.
     pub camera: Pose,

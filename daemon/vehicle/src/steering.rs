@@ -2,10 +2,6 @@
 
 mod ahead;
 mod grounds;
-#[cfg(test)]
-mod settling_tests;
-#[cfg(test)]
-mod tests;
 mod to_place;
 
 pub use ahead::PathAhead;
@@ -399,3 +395,8 @@ impl Steering {
         self.grounds.arrival_m()
     }
 }
+
+#[cfg(test)]
+mod settling_tests;
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,5 @@
 //! The directive: the operator's orders to a vehicle, as independent versioned slots.
 
-mod areas;
 mod choices;
 mod fence;
 mod in_force;
@@ -11,7 +10,6 @@ mod polygon;
 mod progress;
 mod settings;
 
-pub use areas::{Areas, AreasFault, WeightedArea};
 pub use choices::{AtEnd, CellBand, Change, PlannerKind, Registration, ShortDecimal};
 pub use fence::{Fence, FenceFault};
 pub(crate) use in_force::InForceAssembly;
@@ -19,7 +17,7 @@ pub use in_force::{InForceDigests, InForcePart, InForceSummary, PerSlot, REPORTE
 pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use orders::{Budget, Constraints, Destination, ExemplarRequest, ExemplarRequests, Fix, Utility};
 pub(crate) use outbox::{PendingSlot, SlotOutbox, WaitingStop};
-pub use polygon::{Polygon, PolygonFault};
+pub use polygon::{Areas, AreasFault, Polygon, PolygonFault, WeightedArea};
 pub use progress::{OrderStatus, Series, SlotProgress, SlotReport, SlotState, Withdrawal};
 pub use settings::{Settings, SettingsFault};
 

@@ -1,7 +1,6 @@
 //! The vehicle's side of the map: the map itself, the surface's known copy, and the cells in flight.
 
-use super::coarse::Coarse;
-use super::dirty::{CellChange, Dirty};
+use super::dirty::{CellChange, Coarse, Dirty};
 use super::value::{Debounce, Hold, Interest};
 use super::{Cell, LabelGrid, MAX_CONFIDENCE, MapDigest, StateSource, UNEXPLORED};
 use crate::map_codec::{self, Codec, Stride};

@@ -3,8 +3,7 @@
 use super::context::Decision;
 use super::grow::Growth;
 use super::header::{Body, ChunkHeader, base_check};
-use super::lattice::{Lattice, Stride};
-use super::patch::{DecodeError, MapChunk};
+use super::patch::{DecodeError, Lattice, MapChunk, Stride};
 use super::{context, png};
 use crate::bytes::BitReader;
 use crate::grid::{Cell, LabelGrid, Rect};

@@ -1,7 +1,6 @@
 //! Compact patches: growth around a cell in nested rectangles.
 
-use super::lattice::Lattice;
-use super::patch::Patch;
+use super::patch::{Lattice, Patch};
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
 use crate::grid::{Cell, MAX_LABEL, Rect};
 

@@ -3,7 +3,7 @@
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::Rect;
-use crate::map_codec::lattice::{Lattice, Stride};
+use crate::map_codec::patch::{Lattice, Stride};
 use crc::{CRC_8_AUTOSAR, Crc};
 
 /// The coder of the body.

@@ -10,7 +10,6 @@ mod file;
 #[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
 mod grow;
 mod header;
-mod lattice;
 #[allow(clippy::indexing_slicing)] // Cells of its own patch.
 mod patch;
 mod png;
@@ -18,15 +17,12 @@ mod png;
 mod raster;
 #[allow(clippy::indexing_slicing)] // Cells of a row that it has counted.
 mod series;
-#[cfg(test)]
-mod tests;
 
 pub(crate) use chunk::encode_quickly;
 pub use chunk::{ChunkPatch, Codec, decode, encode, encode_every, patch, trace};
 pub use context::{Decision, training};
 pub use file::{ChunkFile, ChunkFileError};
-pub use lattice::Stride;
-pub use patch::{DecodeError, MapChunk};
+pub use patch::{DecodeError, MapChunk, Stride};
 pub use png::restored_png;
 pub use raster::{Deflate, LabelRaster, RasterPngError};
 pub use series::encode_all;
@@ -35,3 +31,6 @@ pub use series::encode_all;
 pub const MAX_PATCH_CELLS: usize = 1 << 16;
 /// The most cells along one side of a patch.
 pub const MAX_PATCH_SIDE: usize = 1 << 10;
+
+#[cfg(test)]
+mod tests;

@@ -5,8 +5,7 @@
 
 use super::grow::Growth;
 use super::header::ChunkHeader;
-use super::lattice::Lattice;
-use super::patch::{DecodeError, MapChunk, Patch};
+use super::patch::{DecodeError, Lattice, MapChunk, Patch};
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::{MAX_LABEL, Rect, UNEXPLORED};
 use crc::{CRC_32_ISO_HDLC, Crc};

@@ -1,7 +1,6 @@
 //! A whole change in as many chunks as it takes.
 
-use super::lattice::Lattice;
-use super::patch::{MapChunk, Patch};
+use super::patch::{Lattice, MapChunk, Patch};
 use super::{Codec, MAX_PATCH_CELLS, MAX_PATCH_SIDE, context, encode, png};
 use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,7 +1,7 @@
 //! Coding and decoding of whole changes.
 
 use super::header::{Body, ChunkHeader};
-use super::lattice::Lattice;
+use super::patch::Lattice;
 use super::{Codec, DecodeError, MapChunk, decode, encode, restored_png};
 use crate::bytes::BitWriter;
 use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};

@@ -26,8 +26,6 @@ mod layout;
 mod part;
 mod receiver;
 mod sender;
-#[cfg(test)]
-mod tests;
 
 pub use layout::Layout;
 pub use part::{ObjectId, Part, PartError};
@@ -36,3 +34,6 @@ pub use sender::{ObjectSender, SymbolRun};
 
 /// The largest object in bytes.
 pub const MAX_OBJECT: usize = 16 * 1024;
+
+#[cfg(test)]
+mod tests;

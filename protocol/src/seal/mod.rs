@@ -17,15 +17,10 @@
 
 mod ascon;
 mod key;
-mod offer;
 mod session;
 mod text;
 
-#[cfg(test)]
-mod tests;
-
-pub use key::{HeldKey, LinkKey, MissionKey, VehicleKey};
-pub use offer::KeyOffer;
+pub use key::{HeldKey, KeyOffer, LinkKey, MissionKey, VehicleKey};
 pub use session::{Direction, SessionKey};
 pub use text::{KeyError, KeyFile};
 
@@ -36,3 +31,6 @@ pub type Tag = [u8; TAG_BYTES];
 
 /// The length of a [`Tag`] in bytes.
 pub const TAG_BYTES: usize = 8;
+
+#[cfg(test)]
+mod tests;

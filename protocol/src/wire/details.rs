@@ -1,7 +1,6 @@
 //! What a vehicle reports beside the pose of the same frame: backlog, disk, faults of its equipment.
 
-use super::refusal::StatusError;
-use super::{Intent, RegistrationReport, Trail};
+use super::{Intent, RegistrationReport, StatusError, Trail};
 use crate::bytes::{Reader, Truncated};
 
 /// Faults, intent, registration and trail of the pose in the same frame, which it precedes. A pose without it has none of them.

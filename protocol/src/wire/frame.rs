@@ -1,9 +1,9 @@
 //! Frames, the unit of transmission, and their seals.
 
-use super::address::{Address, MissionId, SessionId};
+use super::FrameError;
 use super::chunk::{ChunkKind, Chunks, has_second_byte, push_chunk, to_the_end};
+use super::fields::{Address, MissionId, SessionId};
 use super::header::{FrameKind, Header};
-use super::refusal::FrameError;
 use crate::bytes::Reader;
 use crate::seal::{Direction, LinkKey, SessionKey, TAG_BYTES, Tag};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc, Digest};

@@ -1,10 +1,8 @@
 //! The header of a frame, and its number: a few bits on the wire, unbounded inside.
 
 use super::ack::{AckStatement, Horizon};
-use super::address::{Address, SessionId};
-use super::refusal::FrameError;
-use super::stamp::Stamp;
-use super::{MAX_WINDOW, WIRE_VERSION};
+use super::fields::{Address, SessionId, Stamp};
+use super::{FrameError, MAX_WINDOW, WIRE_VERSION};
 use crate::bytes::Reader;
 use std::num::NonZeroU16;
 

@@ -1,12 +1,11 @@
 //! A third party that hears both ends: it learns their runs and the numbers of their frames, and so verifies and reads each frame.
 
-use super::WIRE_VERSION;
-use super::address::{Address, MissionId, SessionId};
 use super::chunk::ChunkKind;
+use super::fields::{Address, MissionId, SessionId};
 use super::frame::{Envelope, Frame, Seal};
 use super::header::Header;
 use super::introduction::Introduction;
-use super::refusal::FrameError;
+use super::{FrameError, WIRE_VERSION};
 use crate::seal::{Direction, HeldKey, LinkKey, SessionKey};
 use std::collections::{BTreeMap, VecDeque};
 

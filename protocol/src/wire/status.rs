@@ -1,8 +1,8 @@
 //! The vehicle's status.
 
+use super::StatusError;
 use super::details::{Backlog, DiskReport, EquipmentFaults};
 use super::path::{Placement, PlannedPath};
-use super::refusal::StatusError;
 use super::trail::{Intent, RegistrationReport, TrailCorner};
 use crate::bytes::{Reader, Truncated, decimetres, put24};
 use crate::coordinates::MapPoint;

@@ -1,6 +1,6 @@
 //! What a vehicle reports with a pose: the track before it, how its last camera frames were placed, the purpose of its plan.
 
-use super::refusal::StatusError;
+use super::StatusError;
 use crate::bytes::{BitReader, BitWriter, DecimetreStep, Reader, Truncated, decimetres, width_of};
 use crate::coordinates::MapPoint;
 use crate::map::MAX_LABEL;

@@ -14,8 +14,6 @@ mod affinity;
 mod cells;
 mod checkpoint;
 mod config;
-#[cfg(test)]
-mod consistency_tests;
 mod kernel;
 mod label_map;
 mod labels;
@@ -30,3 +28,6 @@ pub use kernel::Kernel;
 pub use label_map::FlatCell;
 pub use labels::TopicId;
 pub use model::{Inserted, SceneModel};
+
+#[cfg(test)]
+mod consistency_tests;

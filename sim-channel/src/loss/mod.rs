@@ -4,15 +4,13 @@
 
 mod bursts;
 mod measured;
-mod replayed;
 mod snr;
 mod trace;
 
 pub use bursts::{GilbertElliott, ThreeState};
 pub use measured::{FitError, FittedLink, RangeTable, RangeTableError};
-pub use replayed::Replayed;
 pub use snr::Snr;
-pub use trace::{Trace, TraceError};
+pub use trace::{Replayed, Trace, TraceError};
 
 use crate::random::RandomStream;
 use std::fmt::Debug;

@@ -109,7 +109,7 @@ impl Survey {
         })
     }
 
-    /// Takes the next frame.
+    /// Takes the frame of the next place, and measures the time of each part.
     fn fly(&mut self) -> FrameCost {
         let (row, column) = (self.frames / 16, self.frames % 16);
         let place = |index: usize| (index as f64 + 0.5) * self.edge_m;

@@ -4,7 +4,7 @@ use clap::Args;
 use scenecast_core::UserError;
 use std::path::PathBuf;
 
-/// The program `scenecast`.
+/// The program `scenecast` whose processes are measured.
 #[derive(Debug, Args)]
 pub(crate) struct ProgramArgument {
     /// Program scenecast to start [default: the one in the folder of this program]

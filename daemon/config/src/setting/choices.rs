@@ -96,21 +96,21 @@ choices! {
     Authenticate "lowercase" {
         /// Frames from the surface to the vehicle.
         Down,
-        /// Frames of both directions.
+        /// Frames of both directions, so that nobody can forge the map either.
         All,
     }
 
     /// The make of modem, or the network that stands for one.
     ModemKind "lowercase" {
-        /// EvoLogics S2C.
+        /// A modem of EvoLogics with its S2C commands.
         S2c,
-        /// WHOI Micromodem.
+        /// A WHOI Micromodem, whose commands are NMEA sentences.
         Micromodem,
         /// A modem that passes bytes on as they are.
         Transparent,
         /// Frames in a TCP stream.
         Tcp,
-        /// Frames in UDP datagrams.
+        /// Frames in UDP datagrams, one frame in each.
         Udp,
     }
 
@@ -125,19 +125,19 @@ choices! {
 
     /// Which cells of the map are sent.
     MapCells "lowercase" {
-        /// Every cell.
+        /// Every cell of the scene model.
         Fine,
         /// Every fourth cell in both directions.
         Coarse,
     }
 
-    /// What carries ROS 2.
+    /// The middleware that carries the topics of ROS 2.
     RosTransport "lowercase" {
         /// DDS, as `rmw_fastrtps_cpp` and `rmw_cyclonedds_cpp` use it.
         Dds,
         /// Zenoh, as `rmw_zenoh_cpp` uses it.
         Zenoh,
-        /// Both side by side.
+        /// Both side by side, joined to one node.
         Both,
     }
 
@@ -155,7 +155,7 @@ choices! {
     SceneLabels "lowercase" {
         /// Topics of the visual words.
         Topics,
-        /// Cells that look alike.
+        /// Cells that look alike over all their images.
         Habitats,
     }
 
@@ -177,13 +177,13 @@ choices! {
 
     /// The driver of the autopilot.
     AutopilotKind "lowercase" {
-        /// No autopilot.
+        /// No autopilot: waypoints are only logged.
         None,
-        /// A simulated vehicle.
+        /// A simulated vehicle, in builds that have the simulator.
         Rehearsal,
-        /// ArduSub or ArduRover.
+        /// ArduSub or ArduRover over MAVLink 2.
         Mavlink,
-        /// NMEA 0183 sentences.
+        /// NMEA 0183 sentences in both directions.
         Nmea,
         /// NMEA 0183 sentences that are appended to a file.
         Log,
@@ -193,7 +193,7 @@ choices! {
     RestoreOrders "lowercase" {
         /// After an operator has confirmed it.
         Ask,
-        /// By itself.
+        /// By itself, as soon as the vehicle has no record of them.
         Auto,
     }
 
@@ -201,17 +201,17 @@ choices! {
     StartMode "lowercase" {
         /// It holds until the operator orders it to resume.
         Hold,
-        /// It surveys.
+        /// It surveys at once, without an order.
         Free,
     }
 
     /// What the operator of a rehearsal does.
     OperatorScript "lowercase" {
-        /// Orders at fixed times.
+        /// Two utilities and some exemplar requests, at fixed shares of the survey's duration.
         Scripted,
         /// The same orders within a fence and limits.
         Fenced,
-        /// No orders.
+        /// No orders from its start to its end.
         None,
     }
 }

@@ -95,7 +95,7 @@ sources! {
 
     /// Where the distances of a live camera's pixels come from.
     DepthSource {
-        /// Nothing measures them.
+        /// Nothing measures them; the sea floor counts as flat.
         None,
         /// A topic of depth images in ROS 2.
         Ros2(String) = "ros2" "TOPIC",

@@ -7,12 +7,10 @@ mod guard;
 mod handlers;
 mod openapi;
 mod operations;
-mod page_files;
 mod response;
 mod server;
 mod shared;
 
-pub use page_files::page_files;
-pub use response::gzip;
+pub use response::{gzip, page_files};
 pub use server::{Console, ConsoleListener, bind, start};
 pub use shared::PendingRequest;

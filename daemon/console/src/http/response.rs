@@ -1,22 +1,21 @@
-//! Replies as HTTP responses, compressed for clients that accept gzip, or only status 304 for those that have the content; and
-//! the bodies of orders as JSON.
+//! Replies over HTTP, and the files of the page.
 
 use crate::bodies::{ArchiveList, ErrorBody};
 use crate::export::map_body;
 use axum::Json;
 use axum::body::{Body, to_bytes};
 use axum::extract::{FromRequest, Request};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use crc::{CRC_32_ISCSI, Crc};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use scenecast_surface::Reply;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use std::fmt::Display;
-use std::fmt::Formatter;
+use std::fmt::{Display, Formatter};
 use std::io::Write;
 use std::marker::PhantomData;
 
@@ -149,6 +148,37 @@ pub(super) fn tagged(headers: &HeaderMap, tag: &str, response: impl FnOnce() -> 
     response
 }
 
+static FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
+
+/// Content type and bytes of a file of the page; the empty path means index.html.
+pub(super) fn find_page_file(path: &str) -> Option<(&'static str, &'static [u8])> {
+    let path = if path.is_empty() { "index.html" } else { path };
+    let &(name, bytes) = FILES.iter().find(|(name, _)| *name == path)?;
+    let content_type = match name.rsplit('.').next() {
+        Some("html") => "text/html; charset=utf-8",
+        Some("css") => "text/css; charset=utf-8",
+        Some("js") => "text/javascript; charset=utf-8",
+        Some("svg") => "image/svg+xml",
+        Some("webp") => "image/webp",
+        Some("png") => "image/png",
+        _ => "application/octet-stream",
+    };
+    Some((content_type, bytes))
+}
+
+/// The files of the page with their bytes, the form for the token among them.
+pub fn page_files() -> impl Iterator<Item = (&'static str, &'static [u8])> {
+    FILES.iter().copied()
+}
+
+/// Serves a file of the page.
+pub(super) async fn page(uri: Uri, headers: HeaderMap) -> Response {
+    const SUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
+    let Some((content_type, bytes)) = find_page_file(uri.path().trim_start_matches('/')) else { return not_found() };
+    let tag = format!("{:08x}", SUM.checksum(bytes));
+    tagged(&headers, &tag, || ([(header::CONTENT_TYPE, content_type)], bytes).into_response())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,5 +210,17 @@ mod tests {
         assert_eq!(status(HeaderMap::new()), StatusCode::OK);
         assert_eq!(status(held("W/\"a0\"")), StatusCode::OK);
         assert_eq!(status(held("W/\"a0\", W/\"a1\"")), StatusCode::NOT_MODIFIED);
+    }
+
+    #[test]
+    fn the_page_and_the_daemon_have_the_same_palette() {
+        let (_, script) = find_page_file("js/palette-table.js").unwrap();
+        let hex: String = std::str::from_utf8(script).unwrap().split('"').skip(1).step_by(2).collect();
+        let page: Vec<u32> = hex
+            .as_bytes()
+            .chunks(6)
+            .map(|c| u32::from_str_radix(std::str::from_utf8(c).unwrap(), 16).unwrap())
+            .collect();
+        assert_eq!(page, scenecast_core::palette::PALETTE);
     }
 }

@@ -1,7 +1,7 @@
 //! Listens, and joins the parts of the server.
 
 use super::access::{Access, HostNames};
-use super::page_files::page;
+use super::response::page;
 use super::shared::{PendingRequest, Shared};
 use super::{connections, guard, openapi, operations, response};
 use axum::Router;

@@ -4,8 +4,8 @@ mod map;
 
 pub(crate) use map::ShownMap;
 
-use crate::layer_text::layer_of_text;
-use map::MapHistory;
+pub use map::layer_text;
+use map::{MapHistory, layer_of_text};
 use scenecast_core::UserError;
 use scenecast_files::{
     FrameTimes, MissionClock, MissionSpeed, RecordedMessage, StateTime, mission_records, read_record,

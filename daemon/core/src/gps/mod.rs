@@ -2,16 +2,14 @@
 
 use crate::geodesy::{LatLon, TangentPlane};
 use crate::nmea::{PositionKind, Sentence};
-mod first_fix;
 mod gpsd;
-mod way;
+mod trust;
 
 use crate::{Lines, Reminder, nmea};
-use first_fix::FirstFix;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::time::Duration;
-use way::Way;
+use trust::{FirstFix, Way};
 
 /// The language of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

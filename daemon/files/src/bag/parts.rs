@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) const ZSTD: &[u8] = b"\x28\xB5\x2F\xFD";
 
-/// Largest `metadata.yaml`, bytes.
+/// The largest `metadata.yaml` that is read, bytes.
 const MAX_METADATA: u64 = 1 << 20;
 
 /// The file of this path, or the files `*.mcap` of a folder in the order of their numbers.

@@ -50,7 +50,7 @@ pub(crate) enum RecordError {
 /// What could not be read of a bag.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Damage {
-    /// A line of [`gaps`].
+    /// A file of the bag is missing, or does not belong to it: a line of [`gaps`].
     #[error("{0}")]
     Gap(String),
     #[error("{}: {error}", .path.display())]

@@ -18,7 +18,7 @@ pub(super) struct Part {
     pub messages: BTreeMap<String, u64>,
 }
 
-/// What `metadata.yaml` says.
+/// The content of `metadata.yaml`, which describes the parts of a bag.
 #[derive(Debug)]
 pub(super) struct Metadata {
     stem: String,

@@ -6,8 +6,6 @@ mod figures;
 mod fleet;
 mod golden;
 mod opaque;
-#[cfg(test)]
-mod opaque_tests;
 mod ranging;
 mod speed;
 mod tally;
@@ -22,3 +20,6 @@ pub use ranging::{RangingRow, measure_ranging};
 pub use speed::{Speed, measure_speed};
 pub use tally::Summary;
 pub use trial::LinkEffort;
+
+#[cfg(test)]
+mod opaque_tests;

@@ -4,17 +4,9 @@ mod accuracy;
 mod anchored;
 mod camera;
 mod events;
-#[cfg(test)]
-mod label_tests;
 mod labels;
 mod logbook;
-#[cfg(test)]
-mod planned_tests;
 mod quality;
-#[cfg(test)]
-mod track_tests;
-#[cfg(test)]
-mod tuned_tests;
 
 use crate::carrier::Carrier;
 use crate::frames_log::FramesLog;
@@ -363,3 +355,12 @@ fn script(config: &Config, area: Area) -> Script {
         OperatorScript::None => Script::none(),
     }
 }
+
+#[cfg(test)]
+mod label_tests;
+#[cfg(test)]
+mod planned_tests;
+#[cfg(test)]
+mod track_tests;
+#[cfg(test)]
+mod tuned_tests;

@@ -2,11 +2,8 @@
 
 mod watch;
 
-pub use watch::Publisher;
-
 use crate::dds::Dds;
 use crate::inbox::Inbox;
-use crate::names::remapped;
 use crate::stop::Owned;
 use crate::transport::{Feed, Peers, Qos, Transport, failed, locked};
 use crate::zenoh::Zenoh;
@@ -14,9 +11,14 @@ use scenecast_config::{Remap, Ros2, RosName, RosTransport};
 use scenecast_core::UserError;
 use scenecast_messages::Message;
 use scenecast_messages::contents::Health;
+use scenecast_messages::grid_map_msgs::GridMap;
+use scenecast_messages::nav_msgs::{OccupancyGrid, Odometry};
+use scenecast_messages::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
+use scenecast_messages::tf2_msgs::TFMessage;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+pub use watch::Publisher;
 use watch::Wanted;
 
 /// Time between two tries to start.
@@ -177,5 +179,94 @@ impl Shared {
     /// Whether rmw_zenoh has its router; `None` if it is not used.
     fn has_router(&self) -> Option<bool> {
         self.zenoh.as_ref().map(|zenoh| zenoh.has_router())
+    }
+}
+
+/// A topic by its whole name, such as `/camera/image_raw`.
+///
+/// # Errors
+///
+/// One line that gives the name and the allowed form.
+pub fn topic(name: &str) -> Result<RosName, UserError> {
+    let rule = "a topic of ROS 2 is such as /camera/image_raw: parts of letters, digits and underscores after slashes";
+    RosName::parse(name).ok_or_else(|| UserError::Input(format!("{name:?}: {rule}")))
+}
+
+/// The name under which a topic is used.
+pub(crate) fn remapped<'a>(name: &'a RosName, remaps: &'a [Remap]) -> &'a RosName {
+    remaps.iter().find(|remap| remap.from == *name).map_or(name, |remap| &remap.to)
+}
+
+/// Images that wait at most.
+const IMAGES: usize = 5;
+/// Poses and transforms that wait at most: 4 s at 50 a second.
+const POSES: usize = 200;
+
+impl RosNode {
+    /// Images without compression: best effort, depth 5.
+    pub fn subscribe_images(&self, topic: &RosName) -> Result<Inbox<Image>, UserError> {
+        self.subscribe(topic, Qos::Sensor(5), IMAGES)
+    }
+
+    /// Compressed images: best effort, depth 5.
+    pub fn subscribe_compressed_images(&self, topic: &RosName) -> Result<Inbox<CompressedImage>, UserError> {
+        self.subscribe(topic, Qos::Sensor(5), IMAGES)
+    }
+
+    /// Clouds of points: best effort, depth 5.
+    pub fn subscribe_clouds(&self, topic: &RosName) -> Result<Inbox<PointCloud2>, UserError> {
+        self.subscribe(topic, Qos::Sensor(5), IMAGES)
+    }
+
+    /// Calibrations, if a camera has one: best effort, depth 5.
+    pub fn subscribe_camera_info(&self, topic: &RosName) -> Result<Inbox<CameraInfo>, UserError> {
+        self.subscribe_if_there(topic, Qos::Sensor(5), IMAGES)
+    }
+
+    /// Estimates of pose and speed: best effort.
+    pub fn subscribe_odometry(&self, topic: &RosName) -> Result<Inbox<Odometry>, UserError> {
+        self.subscribe(topic, Qos::Sensor(50), POSES)
+    }
+
+    /// Transforms that change, usually on `/tf`: best effort.
+    pub fn subscribe_tf(&self, topic: &RosName) -> Result<Inbox<TFMessage>, UserError> {
+        self.subscribe(topic, Qos::Sensor(100), POSES)
+    }
+
+    /// Transforms that stay, if there are any, usually on `/tf_static`; those before the subscription are included.
+    pub fn subscribe_static_tf(&self, topic: &RosName) -> Result<Inbox<TFMessage>, UserError> {
+        self.subscribe_if_there(topic, Qos::Latched(100), POSES)
+    }
+
+    /// Whole grids of labels: the last one, and each new one of a publisher that keeps its last message.
+    pub fn subscribe_label_map(&self, topic: &RosName) -> Result<Inbox<OccupancyGrid>, UserError> {
+        self.subscribe(topic, Qos::Latched(1), 1)
+    }
+
+    /// Grids with several layers: the last one, and each new one of a publisher that keeps its last message.
+    pub fn subscribe_grid_map(&self, topic: &RosName) -> Result<Inbox<GridMap>, UserError> {
+        self.subscribe(topic, Qos::Latched(1), 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_messages::contents::valid_part;
+
+    #[test]
+    fn vehicle_names_become_parts_of_topics() {
+        assert_eq!(valid_part("auv-1"), "auv_1");
+        assert_eq!(valid_part("2nd"), "_2nd");
+        assert_eq!(valid_part(""), "_");
+        assert!(topic(&format!("/scenecast/{}/map", valid_part("Möwe 3"))).is_ok());
+        assert!(topic("map").unwrap_err().to_string().contains("/camera/image_raw"));
+    }
+
+    #[test]
+    fn a_remap_replaces_a_whole_name() {
+        let remaps = [Remap { from: topic("/a/map").unwrap(), to: topic("/map").unwrap() }];
+        assert_eq!(remapped(&topic("/a/map").unwrap(), &remaps).as_str(), "/map");
+        assert_eq!(remapped(&topic("/a/map2").unwrap(), &remaps).as_str(), "/a/map2");
     }
 }

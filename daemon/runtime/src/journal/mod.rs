@@ -3,13 +3,6 @@
 mod record;
 mod storage;
 
-#[cfg(test)]
-mod cuts;
-#[cfg(test)]
-mod damage;
-#[cfg(test)]
-pub(super) mod disk;
-
 pub(super) use record::Damage;
 pub(crate) use storage::{Folder, Storage, write_whole};
 
@@ -228,3 +221,10 @@ fn find(names: JournalNames, [journal, copy]: [RecordContent; 2]) -> Found {
         (RecordContent::Torn, _) => Found::Lost(names.journal, Damage::Content),
     }
 }
+
+#[cfg(test)]
+mod cuts_tests;
+#[cfg(test)]
+mod damage_tests;
+#[cfg(test)]
+pub(super) mod disk;

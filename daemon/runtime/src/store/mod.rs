@@ -3,15 +3,7 @@
 mod archives;
 mod batch;
 mod files;
-#[cfg(test)]
-mod fuzz_corpus;
-#[cfg(test)]
-mod kept_log;
 mod log;
-#[cfg(test)]
-mod power_cuts;
-#[cfg(test)]
-mod refusing;
 
 pub(super) use archives::{ArchiveInfo, ArchivedFile};
 pub(super) use files::SurfaceFiles;
@@ -192,3 +184,12 @@ fn set_aside<S: Storage>(storage: &mut S, name: &str) -> io::Result<()> {
     let Some(bytes) = storage.read(STORE)? else { return Ok(()) };
     write_whole(storage, name, &bytes).map(drop)
 }
+
+#[cfg(test)]
+mod fuzz_corpus_tests;
+#[cfg(test)]
+mod kept_log_tests;
+#[cfg(test)]
+mod power_cuts_tests;
+#[cfg(test)]
+mod refusing_disk_tests;

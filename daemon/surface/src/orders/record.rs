@@ -68,7 +68,7 @@ pub struct MarkerOrder {
     pub text: String,
 }
 
-/// Removes a marker.
+/// Removes a marker from the map.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RemoveMarkerOrder {

@@ -64,7 +64,7 @@ pub struct ConstraintsOrder {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ConstraintsAction {
-    /// It holds its position.
+    /// It holds its position until it is ordered to resume.
     Hold,
     /// It continues its survey, also after a breach.
     Resume,

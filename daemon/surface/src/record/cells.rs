@@ -1,7 +1,6 @@
 //! Copies of maps: what the surface has received, cell by cell, with its time, and the labels that cells had before.
 
-use super::contact::StoredContact;
-use super::event::StoredCells;
+use super::event::{StoredCells, StoredContact};
 use crate::label_book::LabelBook;
 use scenecast_protocol::map::{Cell, LabelTree, LayerDescriptor, LayerId, LayerReplica, Replica, SharedTiles};
 use scenecast_protocol::time::Instant;

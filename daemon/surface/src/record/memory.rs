@@ -1,10 +1,9 @@
 //! The surface's knowledge, folded from its events.
 
 use super::cells::{EarlierMap, FormerLabels, MapCopy};
-use super::contact::StoredContact;
 use super::event::{
-    Event, EventKind, EventTime, RunId, StoredBudget, StoredCommand, StoredCommandChange, StoredDraft, StoredImage,
-    StoredIntent, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
+    Event, EventKind, EventTime, RunId, StoredBudget, StoredCommand, StoredCommandChange, StoredContact, StoredDraft,
+    StoredImage, StoredIntent, StoredMarker, StoredNote, StoredOrder, StoredPlaces, StoredRequest, VehicleEvent,
 };
 use crate::label_book::{LabelBook, StoredLabel};
 use crate::log::{StoredLogEntry, make_room};

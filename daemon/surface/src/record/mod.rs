@@ -1,18 +1,16 @@
 //! What the surface keeps across restarts, as events. Folding all events gives the [`SurfaceMemory`] again.
 
 mod cells;
-mod contact;
 mod event;
 mod memory;
 
 pub use super::label_book::StoredLabel;
 pub use super::log::StoredLogEntry;
 pub use cells::{EarlierMap, MapCopy};
-pub use contact::{StoredContact, StoredRange};
 pub use event::{
     DecodeError, Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredCells, StoredCommand,
-    StoredCommandChange, StoredDraft, StoredImage, StoredIntent, StoredMarker, StoredNote, StoredOrder, StoredPlaces,
-    StoredRequest, VehicleEvent, decode, encode,
+    StoredCommandChange, StoredContact, StoredDraft, StoredImage, StoredIntent, StoredMarker, StoredNote, StoredOrder,
+    StoredPlaces, StoredRange, StoredRequest, VehicleEvent, decode, encode,
 };
 pub use memory::{Began, SurfaceMemory, VehicleMemory};
 pub(crate) use memory::{MAX_COMMAND_CHANGES, MAX_MARKERS};

@@ -2,10 +2,10 @@
 
 use crate::state::{
     CommandChangeName, CommandChangeState, CommandHolderState, CommandRequestState, CommandState, MapPlacement, Origin,
-    PrincipalInfo, PrincipalRole, StorageInfo, SurfacePosition, seconds,
+    PrincipalInfo, PrincipalRole, StorageInfo, SurfacePosition, TruthInfo, seconds,
 };
-use crate::truth::Truth;
 use crate::{COMMAND_SILENCE, Command, CommandChange, CommandChangeKind, Principal, Role, Surface};
+use bytes::Bytes;
 use scenecast_config::{self as config, Config};
 use scenecast_core::LatLon;
 use scenecast_messages::contents::Stamps;
@@ -148,4 +148,13 @@ pub(super) fn surface_position(surface: &Surface, now: Instant) -> Option<Surfac
         fixes_sent: relay.fixes(),
         usbl_rejected: relay.faults().map(|(f, n)| (f.name().to_owned(), n)).collect(),
     })
+}
+
+/// The true classes of a part of a simulated sea floor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// The outline of the picture, and its classes.
+    pub info: TruthInfo,
+    /// An indexed PNG, one pixel a cell, north up.
+    pub picture: Bytes,
 }

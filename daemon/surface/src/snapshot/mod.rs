@@ -6,13 +6,12 @@ mod link;
 mod vehicle;
 
 pub(crate) use facts::command_state;
-pub use facts::{MissionFacts, measured_origin, principal_info};
+pub use facts::{MissionFacts, Truth, measured_origin, principal_info};
 pub(crate) use vehicle::marker;
 
 use crate::Surface;
 use crate::link_meter::LinkMeter;
 use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState, seconds};
-use crate::truth::Truth;
 use bytes::Bytes;
 use scenecast_messages::contents::Stamps;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor};

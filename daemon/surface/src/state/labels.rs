@@ -92,7 +92,7 @@ pub struct ExemplarImage {
     /// Its middle in the world frame, metres east of the origin; null where it is not known.
     #[serde(default)]
     pub x_m: Option<f64>,
-    /// The same, metres north.
+    /// Its middle in the world frame, metres north of the origin; null where it is not known.
     #[serde(default)]
     pub y_m: Option<f64>,
     /// Whether it was requested; otherwise the vehicle sent it with spare capacity.

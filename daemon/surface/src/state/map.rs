@@ -66,7 +66,7 @@ pub struct MapPlacement {
 /// The labels that a cell had before its present one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CellHistory {
-    /// The newest first.
+    /// The former labels, the newest first.
     pub former: Vec<FormerLabel>,
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct ReplayState {
     /// The first moment of the record.
     pub from_utc_s: f64,
-    /// The last one.
+    /// The last moment of the record.
     pub to_utc_s: f64,
     /// The moment that is shown.
     pub at_utc_s: f64,
@@ -18,7 +18,7 @@ pub struct ReplayState {
     pub speed: f64,
     /// Seconds of mission time for each recorded second.
     pub mission_speed: f64,
-    /// Whose knowledge is shown.
+    /// The end of the link whose knowledge is shown.
     pub side: ReplaySide,
     /// What the given records can show.
     pub sides: Vec<ReplaySide>,
@@ -33,9 +33,9 @@ pub struct ReplayState {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ReplaySide {
-    /// What the operator knew.
+    /// What the operator knew at that moment.
     Operator,
-    /// What the vehicle knew.
+    /// What the vehicle knew at that moment.
     Vehicle,
     /// What the operator knew, and on the map the cells alone in which the vehicle's map differs: with its label, or with the
     /// operator's where the vehicle has none.
@@ -71,13 +71,13 @@ pub struct ReplayEventList {
 /// An event of a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReplayEvent {
-    /// Seconds since 1970, UTC.
+    /// The time of the event, seconds since 1970, UTC.
     pub at_utc_s: f64,
     /// order, silence, mode, label, image, record, command, fault, refused, loop or vehicle.
     pub kind: String,
     /// The address of the vehicle; null if the event concerns the surface or all vehicles.
     pub vehicle: Option<u8>,
-    /// One line for people.
+    /// The event in one line, for people.
     pub text: String,
 }
 
@@ -87,11 +87,11 @@ pub struct ReplayEvent {
 pub struct ReplayOrder {
     /// The moment to show, seconds since 1970, UTC.
     pub at_utc_s: Option<f64>,
-    /// Whether to play.
+    /// Whether to play the record; otherwise its moment stands.
     pub is_playing: Option<bool>,
     /// Recorded seconds for each second.
     #[schemars(range(min = 0.1, max = 1000))]
     pub speed: Option<f64>,
-    /// Whose knowledge to show.
+    /// The end of the link whose knowledge to show.
     pub side: Option<ReplaySide>,
 }

@@ -1,6 +1,6 @@
 //! The pictures of the sea floor that the vehicle sends with what the link has to spare.
 
-use super::frame_clock::FrameClock;
+use super::evidence::FrameClock;
 use crate::exemplar::{GOOD_SSIM, compress_to};
 use crate::mosaic::{FloorTile, TilePlace};
 use image::RgbImage;

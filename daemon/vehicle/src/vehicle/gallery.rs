@@ -1,11 +1,10 @@
 //! The exemplars of the vehicle: those that it has, those that it has sent, and those that the surface requests.
 
-use super::frame_clock::FrameClock;
+use super::evidence::FrameClock;
 use crate::SharedExemplars;
 use crate::exemplar::{GOOD_SSIM, compress_to, middle, middle_size};
 use scene_model::exemplars::ExemplarPatch;
-use scenecast_protocol::directive::Series;
-use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
+use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests, Series};
 use scenecast_protocol::exemplar::{Exemplar, ExemplarView, edge_px, max_bytes};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;

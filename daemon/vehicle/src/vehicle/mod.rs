@@ -3,19 +3,12 @@
 //! [`Vehicle`] joins parts that own their state: the navigator estimates the position, the guidance chooses waypoints, the
 //! publisher selects the parts of the map that are sent, and the gallery sends exemplars.
 
-#[cfg(test)]
-mod band_tests;
 mod bands;
 mod durable;
 mod evidence;
 mod floor;
-mod frame_clock;
 mod gallery;
 mod guidance;
-#[cfg(test)]
-mod in_force_tests;
-#[cfg(test)]
-mod orders_tests;
 mod publisher;
 mod report;
 mod slots;
@@ -456,3 +449,10 @@ impl Vehicle {
         self.link.poll_timeout()
     }
 }
+
+#[cfg(test)]
+mod band_tests;
+#[cfg(test)]
+mod in_force_tests;
+#[cfg(test)]
+mod orders_tests;

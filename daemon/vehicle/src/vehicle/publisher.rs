@@ -1,8 +1,7 @@
 //! The vehicle's map, and the choice of the cells and layers of it that are sent.
 
 use super::bands::Bands;
-use super::evidence::{Evidence, EvidenceByCell};
-use super::frame_clock::FrameClock;
+use super::evidence::{Evidence, EvidenceByCell, FrameClock};
 use super::storing::WaitingCells;
 use crate::{LabelChanges, MapChanges};
 use scenecast_config::Debounce;

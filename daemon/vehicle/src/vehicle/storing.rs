@@ -128,7 +128,7 @@ impl Storing {
         self.next_map.is_some()
     }
 
-    /// Has exemplars wait.
+    /// Has exemplars wait until their map is stored.
     pub(super) fn hold_exemplars(&mut self, exemplars: SharedExemplars, at: Instant) {
         self.exemplars = Some((exemplars, at));
     }

@@ -2,10 +2,9 @@
 
 use super::Reef;
 use super::fields::Colour;
-use super::optics::{self, Optics};
+use super::optics::{self, Optics, View};
 use super::shading::{CREVICE_M, MAX_APRON, SHADOW_M, shade};
 use super::surface::Surface;
-use super::view::View;
 use crate::noise::floor;
 use image::RgbImage;
 

@@ -17,10 +17,9 @@ mod shading;
 mod surface;
 mod texture;
 mod things;
-mod view;
 
 pub use camera::ReefCamera;
-pub use view::View;
+pub use optics::View;
 
 use ground::Ground;
 use image::{GrayImage, RgbImage};

@@ -1,8 +1,7 @@
-//! Water, lamp, lens, sensor, and the camera's balance of colours.
+//! The view of a frame; water, lamp, lens, sensor, and the camera's balance of colours.
 
 use super::Reef;
 use super::fields::{Colour, blend, scale};
-use super::view::View;
 use crate::noise::Noise;
 use image::RgbImage;
 use scene_model::random::{CounterRng, derive, mix};
@@ -267,4 +266,21 @@ impl Light {
         let veil = |i: usize| self.veil[i] * (1.0 - (-self.rate * range_m).exp()) * 3.0;
         (std::array::from_fn(gain), std::array::from_fn(veil))
     }
+}
+
+/// A frame to be taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The place below the camera, metres east and north.
+    pub x_m: f64,
+    pub y_m: f64,
+    /// Direction of the frame's top, clockwise from north.
+    pub heading_rad: f64,
+    /// Height above the sea floor: the water in between takes and adds light.
+    pub altitude_m: f64,
+    /// Columns and rows of the frame.
+    pub width_px: u32,
+    pub height_px: u32,
+    /// Number of the moment. Snow and noise differ from moment to moment.
+    pub moment: u64,
 }

@@ -2,8 +2,7 @@
 //! cell.
 
 use crate::grid::{Rect, UNEXPLORED};
-use crate::map_codec::lattice::Lattice;
-use crate::map_codec::patch::Patch;
+use crate::map_codec::patch::{Lattice, Patch};
 
 /// The width of the margin around the patch in which contexts look.
 pub(super) const MARGIN: usize = 3;

@@ -10,8 +10,7 @@ mod stage;
 pub mod training;
 
 use super::header::ChunkHeader;
-use super::lattice::Lattice;
-use super::patch::{DecodeError, Patch};
+use super::patch::{DecodeError, Lattice, Patch};
 use crate::bytes::{BitReader, BitWriter};
 use crate::grid::Rect;
 use arith::{BitCoder, Decoder, Encoder};

@@ -9,8 +9,7 @@ use super::stage::{Contexts, Stage};
 use super::{LastRow, Reach, head, write};
 use crate::grid::{MAX_LABEL, UNEXPLORED};
 use crate::map_codec::grow::Growth;
-use crate::map_codec::lattice::Lattice;
-use crate::map_codec::patch::{MapChunk, Patch};
+use crate::map_codec::patch::{Lattice, MapChunk, Patch};
 
 /// The adaptive state of a chunk, initialised from the prior for each.
 #[derive(Debug, Clone)]

@@ -12,8 +12,7 @@ use super::stage::{Contexts, Stage, StageLayout, StagePrior};
 use super::{LastRow, order, read_cells};
 use crate::bytes::BitReader;
 use crate::grid::{Cell, LabelGrid, Rect};
-use crate::map_codec::lattice::Lattice;
-use crate::map_codec::patch::DecodeError;
+use crate::map_codec::patch::{DecodeError, Lattice};
 use crate::map_codec::raster::LabelRaster;
 
 /// Kinds of decision of the coder, each with its own parameters.

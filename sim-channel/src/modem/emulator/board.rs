@@ -1,9 +1,8 @@
 //! The state that every emulated modem has, and the one implementation of [`Emulator`] on top of it; its tasks in order of time,
 //! and faults on demand.
 
-use super::fault::Fault;
 use super::serial_line::SerialLine;
-use super::{Emulator, HostId, ModemEvent, Transmission};
+use super::{Emulator, Fault, HostId, ModemEvent, Transmission};
 use crate::channel::{Arrival, Onset};
 use crate::random::RandomStream;
 use std::collections::{BTreeMap, VecDeque};

@@ -1,6 +1,6 @@
 //! The line between host and modem: baud rate in both directions, and its faults.
 
-use super::fault::Fault;
+use super::Fault;
 use crate::random::RandomStream;
 use std::collections::VecDeque;
 use std::time::Duration;

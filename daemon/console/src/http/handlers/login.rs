@@ -1,8 +1,7 @@
 //! Who a client is: the login form, which exchanges a token for a cookie, the end of the session, and the client's principal.
 
 use crate::http::access::{COOKIE, PeerAddress};
-use crate::http::page_files::find_page_file;
-use crate::http::response::{error, not_found};
+use crate::http::response::{error, find_page_file, not_found};
 use crate::http::shared::Shared;
 use axum::extract::State;
 use axum::extract::rejection::FormRejection;

@@ -1,7 +1,6 @@
 //! ArduSub and ArduRover over MAVLink 2.
 
 mod attitude;
-mod boot_clock;
 pub mod frame;
 pub mod message;
 mod reception;
@@ -10,10 +9,9 @@ mod targets;
 
 use super::{Autopilot, Counters, Goal, Health, Outbox, Step};
 use attitude::Attitude;
-use boot_clock::{BootClock, BootTime};
 use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, boot_time_ms, heard_extra};
-use reception::Reception;
+use reception::{BootClock, BootTime, Reception};
 use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
 use sources::{Altimeter, Claim, HeightSource, Sources, Texts};

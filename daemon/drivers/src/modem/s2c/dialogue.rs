@@ -1,12 +1,13 @@
-//! The command line of an S2C modem: one command at a time, its reply, and the lines in between.
+//! The way to an S2C modem: the queues in front of it and the transmissions in it; its command line with one command at a time,
+//! its reply, and the lines in between.
 
-use super::jobs::Job;
 use super::line::{Line, LineParser};
 use super::setup::{S2cConfig, Step};
 use super::{MAX_REPLY_WAIT, REPLY_TIMEOUT};
-use crate::modem::driver::Token;
+use crate::modem::driver::{Class, Token};
+use scenecast_core::ModemAddress;
 use scenecast_protocol::time::Instant;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// A modem counts at most this many bytes of a record that was cut off.
 const MAX_RECORD_BYTES: usize = 1030;
@@ -156,5 +157,73 @@ impl Dialogue {
 
     pub(super) fn poll_output(&mut self) -> Option<Vec<u8>> {
         self.output.pop_front()
+    }
+}
+
+/// A transmission on its way into the modem.
+#[derive(Debug, Clone)]
+pub(super) struct Job {
+    pub token: Token,
+    pub dst: ModemAddress,
+    pub bytes: Vec<u8>,
+    pub class: Class,
+    /// Times that it was sent and not acknowledged.
+    pub tries: u32,
+    /// When the modem first refused it.
+    pub refused: Option<Instant>,
+}
+
+/// The message that the modem is sending; it takes one at a time.
+#[derive(Debug, Clone)]
+pub(super) struct Message {
+    pub job: Job,
+    /// Whether the other modem acknowledges it.
+    pub acked: bool,
+    /// When it is given up.
+    pub until: Instant,
+}
+
+/// Queued transmissions, and those in the modem.
+#[derive(Debug, Default)]
+pub(super) struct Jobs {
+    pub commands: VecDeque<Job>,
+    /// The newest acknowledgement, which replaces older ones.
+    pub services: VecDeque<Job>,
+    pub bulk: VecDeque<Job>,
+    pub message: Option<Message>,
+    /// Records in the modem's pool by packet counter, and since when.
+    pub pool: BTreeMap<u32, (Token, Instant)>,
+    /// No message is tried before this time.
+    pub message_pause: Instant,
+    /// No record is tried before this time.
+    pub record_pause: Instant,
+}
+
+impl Jobs {
+    pub(super) fn resume(&mut self, now: Instant) {
+        (self.message_pause, self.record_pause) = (now, now);
+    }
+
+    /// Whether the modem holds no bulk.
+    pub(super) fn is_pool_empty(&self) -> bool {
+        self.pool.is_empty()
+    }
+
+    /// Forgets everything; returns the tokens.
+    pub(super) fn clear(&mut self) -> Vec<Token> {
+        let waiting = self.commands.drain(..).chain(self.services.drain(..)).chain(self.bulk.drain(..));
+        let mut tokens: Vec<Token> = waiting.map(|job| job.token).collect();
+        tokens.extend(self.message.take().map(|m| m.job.token));
+        tokens.extend(std::mem::take(&mut self.pool).into_values().map(|(token, _)| token));
+        tokens
+    }
+
+    /// Puts a job back to the front of its queue.
+    pub(super) fn put_back(&mut self, job: Job) {
+        match job.class {
+            Class::Command => self.commands.push_front(job),
+            Class::Service => self.services.push_front(job),
+            Class::Bulk => self.bulk.push_front(job),
+        }
     }
 }

@@ -5,7 +5,6 @@
 //! communicate, and no payload contains a command.
 
 mod dialogue;
-mod jobs;
 mod line;
 mod notice;
 mod receive;
@@ -16,8 +15,7 @@ pub use line::{Line, LineParser};
 pub use setup::{BURST_FRAME_BYTES, INSTANT_BYTES, S2cConfig, S2cMode, instant_airtime};
 
 use super::driver::{Class, Destination, Driver, Event, Refusal, Token, check_length};
-use dialogue::{Dialogue, Pending};
-use jobs::{Job, Jobs};
+use dialogue::{Dialogue, Job, Jobs, Pending};
 use receive::{BurstAirtime, BurstStreams};
 use scenecast_core::ModemAddress;
 use scenecast_protocol::mac::{Access, ModemProfile};

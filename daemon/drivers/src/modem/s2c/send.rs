@@ -1,7 +1,6 @@
 //! The next transmission for an S2C modem and its reply, and the queues in front of the modem.
 
-use super::dialogue::Pending;
-use super::jobs::{Job, Message};
+use super::dialogue::{Job, Message, Pending};
 use super::setup::{INSTANT_BYTES, S2cMode, instant_airtime};
 use super::{EVERYBODY, S2c};
 use crate::modem::driver::{Class, Event, Token};

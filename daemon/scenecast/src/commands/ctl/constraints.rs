@@ -1,12 +1,12 @@
-//! `scenecast ctl fence`, `return-point`, `limits`, `hold`, `resume`, `abort`
+//! `scenecast ctl fence`, `return-point`, `limits`, `areas`, `go`, `hold`, `resume`, `abort`
 
 use clap::{Args, Subcommand};
-use scenecast_console::client::{self, FenceFile, LIMITS, Session};
+use scenecast_console::client::{self, AreasFile, FenceFile, LIMITS, Session};
 use scenecast_core::UserError;
 use scenecast_surface::{ConstraintsAction, ConstraintsOrder, LimitsOrder};
 use std::path::PathBuf;
 
-const FILE: &str = "\
+const FENCE_FILE: &str = "\
 Example: scenecast ctl fence set fence.geojson --wait 120
 
 The property `role` of a feature is one of: fence (a Polygon; the default), keep_out (Polygons), return_point
@@ -17,7 +17,7 @@ an origin needs --metres.";
 pub(super) enum FenceCommand {
     /// Replace the fence, the keep-outs and the return point that a GeoJSON file has. Keep-outs or a return point that it
     /// does not have stay.
-    #[command(after_help = FILE)]
+    #[command(after_help = FENCE_FILE)]
     Set {
         /// GeoJSON file with the outlines and the return point
         file: PathBuf,
@@ -150,4 +150,53 @@ pub(super) async fn abort(session: &Session, yes: bool) -> Result<(), UserError>
         return Err(UserError::Input("an abort ends the survey of the vehicle: --yes confirms it".to_owned()));
     }
     client::send_constraints(session, ConstraintsOrder { action: ConstraintsAction::Abort }).await
+}
+
+const AREAS_FILE: &str = "\
+Example: scenecast ctl areas set areas.geojson --wait 120
+
+Each feature is a Polygon with the property `weight`, from -1 to 1; a file has at most four. Coordinates are longitude and
+latitude, WGS 84, at most 100 km from the mission's origin; a mission without an origin needs --metres.";
+
+#[derive(Debug, Subcommand)]
+pub(super) enum AreasCommand {
+    /// Replace the weighted areas by those of a GeoJSON file.
+    #[command(after_help = AREAS_FILE)]
+    Set {
+        /// GeoJSON file with polygons and their weights
+        file: PathBuf,
+        /// Read the coordinates as metres east and north of the origin
+        #[arg(long)]
+        metres: bool,
+    },
+    /// Remove all weighted areas.
+    #[command(after_help = "Example: scenecast ctl areas clear --wait 120")]
+    Clear,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Go {
+    /// Metres east of the origin
+    #[arg(allow_negative_numbers = true, required_unless_present = "cancel", requires = "north_m")]
+    east_m: Option<f64>,
+    /// Metres north of the origin
+    #[arg(allow_negative_numbers = true)]
+    north_m: Option<f64>,
+    /// Withdraw the order: the vehicle resumes its survey
+    #[arg(long, conflicts_with = "east_m")]
+    cancel: bool,
+}
+
+pub(super) async fn areas(session: &Session, change: Option<AreasCommand>) -> Result<(), UserError> {
+    match change {
+        None => client::show_areas(session).await,
+        Some(AreasCommand::Set { file, metres }) => {
+            client::set_areas(session, Some(AreasFile { path: &file, in_metres: metres })).await
+        }
+        Some(AreasCommand::Clear) => client::set_areas(session, None).await,
+    }
+}
+
+pub(super) async fn go(session: &Session, Go { east_m, north_m, .. }: Go) -> Result<(), UserError> {
+    client::go(session, east_m.zip(north_m).map(|(east, north)| [east, north])).await
 }

@@ -3,14 +3,12 @@
 mod book;
 mod command;
 mod constraints;
-mod places;
 
 use book::{LabelArgs, MarkCommand};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use command::CommandChange;
-use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
-use places::{AreasCommand, Go};
+use constraints::{AreasCommand, FenceCommand, Go, LimitsCommand, ReturnPointCommand};
 use scenecast_console::client::{self, BudgetChange, Client, LogSelection, Session, SettingsChange};
 use scenecast_core::{ClientName, Takes, UserError};
 use scenecast_surface::{ExemplarAction, LogKind, SettingsOrder};
@@ -404,8 +402,8 @@ impl CtlCommand {
             }
             Self::Exemplar { label, out: None, .. } => client::cancel_exemplar(session, &label).await,
             Self::Fence { change } => constraints::fence(session, change).await,
-            Self::Go(go) => places::go(session, go).await,
-            Self::Areas { change } => places::areas(session, change).await,
+            Self::Go(go) => constraints::go(session, go).await,
+            Self::Areas { change } => constraints::areas(session, change).await,
             Self::ReturnPoint { change } => constraints::return_point(session, change).await,
             Self::Limits { change } => constraints::limits(session, change).await,
             Self::Hold => constraints::hold(session, true).await,

@@ -2,7 +2,6 @@
 
 mod bench;
 mod change;
-mod encode;
 
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
@@ -12,9 +11,9 @@ use scenecast_protocol::map_codec::Codec;
 #[derive(Debug, Subcommand)]
 pub enum Map {
     /// Write the chunks that turn one map into another, and print their sizes.
-    Encode(encode::Encode),
+    Encode(change::Encode),
     /// Decode such chunks into a map.
-    Decode(encode::Decode),
+    Decode(change::Decode),
     /// Measure a folder of numbered maps, each encoded against the one before.
     Bench(bench::MapBench),
 }

@@ -53,7 +53,7 @@ pub(super) struct Which {
     pub(super) source: Option<String>,
 }
 
-/// Parameters of the labels.
+/// Parameters of the labels, with which a scene model begins.
 #[derive(Debug, Args)]
 pub(super) struct Parameters {
     /// Topics: prior count of each label in each cell [default: 0.01]

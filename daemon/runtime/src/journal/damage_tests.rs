@@ -1,6 +1,6 @@
 //! Damaged files: a journal is never read as an older state.
 
-use super::cuts::{NAMES, state};
+use super::cuts_tests::{NAMES, state};
 use super::disk::Disk;
 use super::record::FILE_BYTES;
 use super::{Damage, Found, Journal, Storage};

@@ -1,6 +1,6 @@
 //! The log of the mission and command across restarts.
 
-use super::refusing::{at, auv, start};
+use super::refusing_disk_tests::{at, auv, start};
 use crate::journal::disk::Disk;
 use scenecast_core::{ClientName, Giver, Principal, Role};
 use scenecast_protocol::time::Instant;
