@@ -1,6 +1,7 @@
 //! The views of the sea floor that have arrived from a vehicle.
 
 use super::exemplar_cache::StoredExemplar;
+use crate::state::{FloorImage, FloorList, seconds};
 use scenecast_protocol::exemplar::FloorView;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
@@ -65,6 +66,27 @@ impl FloorViews {
             let Some((_, gone)) = oldest.and_then(|place| self.views.remove(&place)) else { return };
             self.bytes -= gone.webp.len();
         }
+    }
+}
+
+/// The views of a vehicle that have arrived after a version.
+pub fn floor_list(vehicle: u8, views: &FloorViews, since: u64) -> FloorList {
+    let image =
+        |(place, number, view): (FloorPlace, u64, &StoredExemplar)| (number, floor_image(vehicle, place, number, view));
+    let mut images: Vec<_> = views.iter().filter(|(_, number, _)| *number > since).map(image).collect();
+    images.sort_by_key(|(number, _)| *number);
+    FloorList { version: views.version(), images: images.into_iter().map(|(_, image)| image).collect() }
+}
+
+fn floor_image(vehicle: u8, (east_dm, north_dm): FloorPlace, number: u64, view: &StoredExemplar) -> FloorImage {
+    let (x_m, y_m) = view.view.middle_m();
+    FloorImage {
+        url: format!("/api/v2/vehicles/{vehicle}/floor/{east_dm}_{north_dm}.webp?number={number}"),
+        x_m,
+        y_m,
+        width_m: view.width_m().unwrap_or_default(),
+        at_s: seconds(view.received),
+        taken_s: view.taken.map(seconds),
     }
 }
 

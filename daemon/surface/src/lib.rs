@@ -40,7 +40,7 @@ pub use command::{
     CommandRequest, OrderKind,
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
-pub use floor_views::{FloorPlace, FloorViews};
+pub use floor_views::{FloorPlace, FloorViews, floor_list};
 pub use label_book::LabelBook;
 pub use link_meter::LinkMeter;
 pub use log::{AUTOPILOT_SILENT, LogEntry, LogKind, MissionLog, NO_FAULT};

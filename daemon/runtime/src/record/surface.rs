@@ -10,10 +10,10 @@ use scenecast_console::layer_text;
 use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
 use scenecast_messages::Message;
-use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
+use scenecast_messages::contents::{MAP_FRAME, Stamps, WORLD_FRAME, header, pose};
 use scenecast_messages::geometry_msgs::Point;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar};
-use scenecast_messages::std_msgs::Text;
+use scenecast_messages::std_msgs::{Header, Text};
 use scenecast_protocol::map::{LayerDescriptor, StateReplica};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::messages::{label_tree, link, order, order_status, place, place_on_earth};
@@ -299,8 +299,18 @@ impl RecordedVehicle {
         let news = record.floor.iter().filter(|(_, number, _)| *number > last);
         let mut news: Vec<_> = news.map(|(_, number, view)| (number, view)).collect();
         news.sort_by_key(|(number, _)| *number);
-        entries.extend(news.into_iter().map(|(_, view)| seen.entry("floor", &picture(seen, view))));
+        entries.extend(news.into_iter().map(|(_, view)| seen.entry("floor", &of_floor(seen, view))));
         self.floor = (record.run, record.floor.version());
+    }
+}
+
+/// A view of the sea floor, which moves with the map.
+fn of_floor(seen: Seen<'_>, view: &StoredExemplar) -> Exemplar {
+    let ((x, y), whole) = (view.view.middle_m(), picture(seen, view));
+    Exemplar {
+        header: Header { frame_id: MAP_FRAME.to_owned(), ..whole.header.clone() },
+        middle: Point { x, y, z: f64::NAN },
+        ..whole
     }
 }
 
