@@ -213,6 +213,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
                 .map(|stream| match stream {
                     "finer" => "the cells between those of a coarse map",
                     "exemplars" => "images of labels",
+                    "floor" => "images of the sea floor",
                     layer => layer,
                 })
                 .collect::<Vec<_>>()
