@@ -27,6 +27,7 @@ use gallery::Gallery;
 use guidance::{Guidance, Situation};
 use publisher::MapPublisher;
 pub use publisher::MapSelection;
+use report::EquipmentState;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
@@ -86,10 +87,7 @@ pub struct Vehicle {
     has_new_orders: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
-    autopilot_silent: bool,
-    faults: EquipmentFaults,
-    /// The codec of layers that are added.
-    codec: Codec,
+    equipment: EquipmentState,
 }
 
 impl Vehicle {
@@ -125,9 +123,7 @@ impl Vehicle {
             has_new_orders: false,
             outputs: VecDeque::new(),
             fixes_applied: 0,
-            autopilot_silent: false,
-            faults: EquipmentFaults::default(),
-            codec: Codec::Auto,
+            equipment: EquipmentState::default(),
         };
         if vehicle.weights.ordered().is_none() && vehicle.durable.utility.take().is_some() {
             let other = SlotState::Refused(RefusalReason::OtherEpoch);
@@ -150,7 +146,7 @@ impl Vehicle {
 
     /// Sets the codec of the layers of bands.
     pub fn set_codec(&mut self, codec: Codec) {
-        self.codec = codec;
+        self.publisher.set_codec(codec);
     }
 
     /// Sets the clock of this computer, with which that of the surface is compared.
@@ -171,12 +167,12 @@ impl Vehicle {
 
     /// Sets whether the autopilot does not answer; the next status reports it.
     pub fn set_autopilot_silent(&mut self, is_silent: bool) {
-        self.autopilot_silent = is_silent;
+        self.equipment.is_autopilot_silent = is_silent;
     }
 
     /// Sets the faults of the equipment; the next status reports them.
     pub fn set_faults(&mut self, faults: EquipmentFaults) {
-        self.faults = faults;
+        self.equipment.faults = faults;
     }
 
     /// Sets the state of the disk; the next status reports it.
@@ -247,7 +243,7 @@ impl Vehicle {
     }
 
     fn publish(&mut self, changes: &MapChanges, now: Instant) {
-        self.publisher.handle_changes(changes, self.storing.labels(), self.codec, &mut self.link, now);
+        self.publisher.handle_changes(changes, self.storing.labels(), &mut self.link, now);
         let Some(labels) = &changes.labels else { return };
         if labels.tree.as_ref().is_some_and(|tree| self.weights.handle_tree(tree, labels.highest)) {
             self.guidance.replan();
