@@ -15,6 +15,7 @@ mod frame;
 mod mapper;
 mod navigator;
 mod picker;
+mod placer;
 pub mod planning;
 mod registration;
 mod steering;
@@ -29,7 +30,8 @@ pub use foreign::{ForeignMap, ForeignRestoreError, ForeignSource};
 pub use frame::Frame;
 pub use mapper::Mapper;
 pub use navigator::{FixVerdict, LastPlace, Navigator};
-pub use registration::{FoundFrame, RegisteredFrame};
+pub use placer::FoundFrame;
+pub use registration::RegisteredFrame;
 pub use scenecast_registration::CameraFinding;
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{
