@@ -35,6 +35,6 @@ pub use registration::RegisteredFrame;
 pub use scenecast_registration::CameraFinding;
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{
-    AppliedSlot, Durable, Evidence, KeptKeys, LostOrders, MapSelection, MappedFrame, Vehicle, VehicleDisk,
-    VehicleOutput,
+    AppliedSlot, Durable, Evidence, KeptBudget, KeptGoals, KeptKeys, KeptLimits, KeptUtility, LostOrders, MapSelection,
+    MappedFrame, Vehicle, VehicleDisk, VehicleOutput,
 };

@@ -13,7 +13,7 @@ mod report;
 mod slots;
 mod storing;
 
-pub use durable::{Durable, KeptKeys, LostOrders};
+pub use durable::{Durable, KeptBudget, KeptGoals, KeptKeys, KeptLimits, KeptUtility, LostOrders};
 pub use evidence::{Evidence, MappedFrame};
 pub use storing::VehicleDisk;
 
@@ -29,7 +29,7 @@ use publisher::MapPublisher;
 pub use publisher::MapSelection;
 use report::EquipmentState;
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState, Utility};
+use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState};
 use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::ClassEntry;
 use scenecast_protocol::map_codec::Codec;
@@ -100,12 +100,6 @@ impl Vehicle {
         durable: Durable,
         now: Instant,
     ) -> Self {
-        let utility = durable.utility.clone().map(|(epoch, exploration, curiosity, weights)| Utility {
-            epoch,
-            exploration,
-            curiosity,
-            weights,
-        });
         let settings = Settings::from_bytes(&durable.settings).unwrap_or_default();
         let mut vehicle = Self {
             link,
@@ -116,7 +110,10 @@ impl Vehicle {
             publisher: MapPublisher::default(),
             gallery: Gallery::default(),
             // The weights are those of labels of their epoch; a new epoch has no labels yet.
-            weights: Weights::new(utility.filter(|u| u.epoch == durable.epoch), durable.weighed),
+            weights: Weights::new(
+                durable.utility.order().filter(|u| u.epoch == durable.epoch),
+                durable.utility.weighed,
+            ),
             storing: Storing::new(durable.epoch, durable.labels),
             durable,
             settings,
@@ -125,7 +122,7 @@ impl Vehicle {
             fixes_applied: 0,
             equipment: EquipmentState::default(),
         };
-        if vehicle.weights.ordered().is_none() && vehicle.durable.utility.take().is_some() {
+        if vehicle.weights.ordered().is_none() && vehicle.durable.utility.order.take().is_some() {
             let other = SlotState::Refused(RefusalReason::OtherEpoch);
             vehicle.link.decide(SlotId::Utility, other, now);
             vehicle.durable.inbox = vehicle.link.persistent_state().clone();
@@ -348,8 +345,8 @@ impl Vehicle {
 
     /// A destination is in force no longer once it is reached.
     fn follow_destination(&mut self, now: Instant) {
-        if self.durable.destination.is_some() && !self.guidance.has_destination() {
-            self.durable.destination = None;
+        if self.durable.goals.destination.is_some() && !self.guidance.has_destination() {
+            self.durable.goals.destination = None;
             self.report_in_force(now);
             self.has_new_orders = true;
             self.outputs.push_back(VehicleOutput::Persist);
@@ -358,13 +355,13 @@ impl Vehicle {
 
     /// Stores the use of the limits and the breach when they have changed enough.
     fn record(&mut self) {
-        let (noted_m, noted_s) = (f64::from(self.durable.used.0), f64::from(self.durable.used.1));
+        let (noted_m, noted_s) = self.durable.limits.used();
         let (used_m, used_s) = self.guidance.used();
         let is_far = used_m - noted_m > RECORD_INTERVAL.0 || used_s - noted_s > RECORD_INTERVAL.1;
         let breach = self.guidance.breach();
-        if (is_far && self.guidance.is_limited()) || breach != self.durable.breach {
-            self.durable.used = (used_m as u32, used_s as u32);
-            self.durable.breach = breach;
+        if (is_far && self.guidance.is_limited()) || breach != self.durable.limits.breach {
+            self.durable.limits.used = (used_m as u32, used_s as u32);
+            self.durable.limits.breach = breach;
             self.outputs.push_back(VehicleOutput::Persist);
         }
     }
