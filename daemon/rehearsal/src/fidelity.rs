@@ -2,6 +2,7 @@
 
 use super::baseline::{Baseline, Stream};
 use super::frames_log::{Repeats, Uplink};
+use super::meter::Delays;
 use super::mission::{MapQuality, Mission, MissionOptions};
 use super::quality::{Curve, Line, Panel};
 use super::world::World;
@@ -21,10 +22,8 @@ pub struct FidelityRow {
     pub stream: &'static str,
     /// Share of explored cells on which the maps agree, mean over the survey.
     pub agreement_mean: f64,
-    /// Seconds until a change of the vehicle's map is on the operator's: median.
-    pub age_s_median: f64,
-    pub age_s_p95: f64,
-    pub age_s_max: f64,
+    #[serde(flatten)]
+    pub age: MapAge,
     /// Both maps at the end of the survey.
     pub end: MapQuality,
     /// The operator's mutual information divided by the vehicle's, after the best rigid fit: at the end, and mean over the
@@ -40,11 +39,40 @@ pub struct FidelityRow {
     pub map_frames_share: f64,
     /// Copies of the vehicle's frames.
     pub repeats: Repeats,
-    /// Energy that the vehicle's modem has transmitted with, joules, in all and for each bit of the map that arrived.
-    pub energy_j: Option<f64>,
-    pub energy_per_map_bit_j: Option<f64>,
+    #[serde(flatten)]
+    pub energy: UplinkEnergy,
     /// The quality of the vehicle's and of the operator's map, a sample each 30 s.
     pub series: Vec<MapQuality>,
+}
+
+/// Seconds until a change of the vehicle's map is on the operator's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MapAge {
+    pub age_s_median: f64,
+    pub age_s_p95: f64,
+    pub age_s_max: f64,
+}
+
+impl MapAge {
+    fn of(delays: &Delays) -> Self {
+        let [age_s_median, age_s_p95, age_s_max] = delays.summary();
+        Self { age_s_median, age_s_p95, age_s_max }
+    }
+}
+
+/// Energy that the vehicle's modem has transmitted with, joules; `None` where its power is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct UplinkEnergy {
+    /// In all.
+    pub energy_j: Option<f64>,
+    /// For each bit of the map that arrived.
+    pub energy_per_map_bit_j: Option<f64>,
+}
+
+impl UplinkEnergy {
+    fn of(joules: Option<f64>, stats: &LinkStats) -> Self {
+        Self { energy_j: joules, energy_per_map_bit_j: joules.and_then(|joules| per_map_bit(joules, stats)) }
+    }
 }
 
 /// Time between two looks at the baseline.
@@ -94,19 +122,15 @@ fn delta(mission: &Mission) -> Stream<'_> {
 impl FidelityRow {
     fn new(mission: &Mission, stream: Stream<'_>) -> Self {
         let Stream { name, labels, end, stats, frames, .. } = stream;
-        let [median, p95, max] = labels.delays(mission.now()).summary();
         let uplink_bytes = Uplink::of(stats);
         let of_map = frames.up.get(Class::Map.name()).map_or(0, |sum| sum.bytes);
         let of_all: u64 = frames.up.values().map(|sum| sum.bytes).sum();
         let series: Vec<MapQuality> = stream.series.iter().copied().chain([end]).collect();
-        let energy_j = mission.joules(stream.bits_on_air);
         Self {
             budget_bps: mission.config().link.budget_bps,
             stream: name,
             agreement_mean: labels.agreement_mean(),
-            age_s_median: median,
-            age_s_p95: p95,
-            age_s_max: max,
+            age: MapAge::of(&labels.delays(mission.now())),
             end,
             operator_share: end.operator_share(),
             operator_share_mean: mean_share(&series),
@@ -114,8 +138,7 @@ impl FidelityRow {
             map_share: uplink_bytes.map_share(),
             map_frames_share: of_map as f64 / of_all.max(1) as f64,
             repeats: stream.repeats,
-            energy_j,
-            energy_per_map_bit_j: energy_j.and_then(|joules| per_map_bit(joules, stats)),
+            energy: UplinkEnergy::of(mission.joules(stream.bits_on_air), stats),
             uplink_bytes,
             series,
         }

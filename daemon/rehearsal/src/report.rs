@@ -70,7 +70,7 @@ fn scene(m: &Mission) -> Value {
     json!({
         "cells": if m.has_foreign_labels() { m.vehicle().map().explored() } else { m.mapper.cells() },
         "words": m.mapper.words(),
-        "labels": m.logbook.labels.highest,
+        "labels": m.logbook.map.highest,
         "perplexity": round(m.mapper.perplexity()),
         "mutual_information_nats": of(|a| a.nats),
         "normalised_mutual_information": of(|a| a.normalised),
@@ -149,7 +149,7 @@ fn map(m: &Mission) -> Value {
         "updates_sent": stats.chunks_sent,
         "flips_suppressed": m.vehicle().flips_suppressed(),
         "payload_bytes": stats.bytes_by_class.get(&Class::Map).copied().unwrap_or(0),
-        "png_full_bytes": m.logbook.png_full_bytes,
+        "png_full_bytes": m.logbook.map.png_full_bytes,
         "agreement_final": round(m.meters.labels.agreement()),
         "agreement_mean": round(m.meters.labels.agreement_mean_of_survey()),
         "age_s": summary(m.meters.labels.delays(m.now()).summary()),
@@ -192,7 +192,7 @@ fn link(m: &Mission) -> Value {
     let one = |i: usize| {
         let audit = m.audits()[i];
         let receiver = [&at_surface, m.vehicle().stats()][i];
-        let (loss, goodput) = (&receiver.loss_in, &receiver.goodput_in);
+        let (loss, goodput) = (&receiver.incoming.loss, &receiver.incoming.goodput);
         json!({
             "sent_bps": round(audit.total_bits() as f64 / seconds),
             "energy_j": m.energy_j().map(|joules| round(joules[i])),

@@ -242,9 +242,13 @@ mod tests {
     use scenecast_protocol::coordinates::DecimetrePoint;
     use scenecast_protocol::directive::{Polygon, Series};
     use scenecast_protocol::link::{SeriesRecord, SlotInboxState};
-    use scenecast_vehicle::KeptKeys;
+    use scenecast_vehicle::{KeptBudget, KeptGoals, KeptKeys, KeptLimits, KeptUtility};
 
     const NAMES: [&str; 2] = [JOURNAL.journal, JOURNAL.copy];
+
+    fn bits_per_s(rate: u32) -> KeptBudget {
+        KeptBudget { bits_per_s: Some(rate), ..KeptBudget::default() }
+    }
 
     fn free() -> FirstStart {
         FirstStart { is_free: true, fence: None }
@@ -260,7 +264,7 @@ mod tests {
         let disk = Disk::default();
         let (mut keeper, durable) = begin(&disk);
         assert_eq!(durable, Durable { lineage: 9, ..Durable::default() });
-        let held = Durable { epoch: 4, labels: 7, hold: true, budget_bps: Some(500), ..durable };
+        let held = Durable { epoch: 4, labels: 7, hold: true, budget: bits_per_s(500), ..durable };
         assert!(keeper.save(&held));
         let later = |epoch| Durable { epoch, labels: 0, ..held.clone() };
         assert_eq!(begin(&disk).1, later(5));
@@ -300,22 +304,20 @@ mod tests {
             epoch: 3,
             labels: 12,
             lineage: 300,
-            utility,
-            weighed: 12,
+            utility: KeptUtility { order: utility, weighed: 12 },
             hold: true,
-            budget_bps: Some(500),
-            shares: Some([10, 5, 5, 50, 20]),
-            background: Some(vec![0x14, 0x40]),
+            budget: KeptBudget {
+                bits_per_s: Some(500),
+                shares: Some([10, 5, 5, 50, 20]),
+                background: Some(vec![0x14, 0x40]),
+            },
             abort: false,
             settings: vec![0x40, 0],
-            limits: vec![0, 4],
-            used: (130, 2),
-            breach: 2,
+            limits: KeptLimits { order: vec![0, 4], used: (130, 2), breach: 2 },
             fence: vec![0],
             place: None,
             lost: LostOrders::Of(Series::from_random(300)),
-            destination: Some((-3, 100)),
-            areas: vec![0],
+            goals: KeptGoals { destination: Some((-3, 100)), areas: vec![0] },
             keys: KeptKeys::default(),
         };
         let golden = [
@@ -357,7 +359,7 @@ mod tests {
     fn a_lost_journal_costs_the_orders_and_not_the_learnt_map() {
         let disk = Disk::default();
         let (mut keeper, durable) = begin(&disk);
-        assert!(keeper.save(&Durable { epoch: 250, lineage: 77, budget_bps: Some(500), ..durable }));
+        assert!(keeper.save(&Durable { epoch: 250, lineage: 77, budget: bits_per_s(500), ..durable }));
         for name in NAMES {
             let mut bytes = disk.read(name).unwrap().unwrap();
             bytes[40] ^= 1;
@@ -371,7 +373,7 @@ mod tests {
     /// The bytes of both files after each of `count` states, the last of which does not hold.
     fn files_after_states(disk: &Disk, count: u32) -> (Vec<[Vec<u8>; 2]>, Durable) {
         let (mut keeper, durable) = begin(disk);
-        let state = |number| Durable { budget_bps: Some(number), hold: number % 3 == 1, ..durable.clone() };
+        let state = |number| Durable { budget: bits_per_s(number), hold: number % 3 == 1, ..durable.clone() };
         let mut files = Vec::new();
         for number in 0..count {
             assert!(keeper.save(&state(number)));
@@ -397,12 +399,19 @@ mod tests {
                 let pair = [damaged(&whole[0], at), damaged(&whole[1], at)];
                 NAMES.iter().zip(&pair).for_each(|(name, bytes)| disk.put(name, bytes));
                 let run = begin(&disk).1;
-                assert!(run.hold && run.lost == LostOrders::Present && run.budget_bps.is_none(), "{at}: {run:?}");
+                assert!(
+                    run.hold && run.lost == LostOrders::Present && run.budget.bits_per_s.is_none(),
+                    "{at}: {run:?}"
+                );
                 for number in [0, 1] {
                     disk.put(NAMES[number], &pair[number]);
                     disk.put(NAMES[1 - number], &whole[1 - number]);
                     let run = begin(&disk).1;
-                    assert_eq!((run.budget_bps, run.lost), (last.budget_bps, last.lost), "{at}: an older state");
+                    assert_eq!(
+                        (run.budget.bits_per_s, run.lost),
+                        (last.budget.bits_per_s, last.lost),
+                        "{at}: an older state"
+                    );
                 }
             }
         }
@@ -413,7 +422,11 @@ mod tests {
         for name in ["vehicle.journal", "vehicle.journal.copy"] {
             let disk = Disk::default();
             let (mut keeper, durable) = begin(&disk);
-            let last = Durable { budget_bps: Some(500), breach: 2, ..durable };
+            let last = Durable {
+                budget: bits_per_s(500),
+                limits: KeptLimits { breach: 2, ..KeptLimits::default() },
+                ..durable
+            };
             assert!(keeper.save(&last));
             disk.remove(name);
             assert_eq!(begin(&disk).1, Durable { epoch: 1, hold: true, ..last.clone() });

@@ -119,7 +119,7 @@ impl PowerCutTrial {
             assert!(last.contains(&(slot.id, slot.version)), "{slot:?}");
         }
         assert!(!self.onboard.saved.hold, "the last version is in force");
-        assert_eq!(self.onboard.saved.budget_bps, Some(9000));
+        assert_eq!(self.onboard.saved.budget.bits_per_s, Some(9000));
     }
 
     fn is_converged(&self) -> bool {

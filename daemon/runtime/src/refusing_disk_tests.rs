@@ -144,7 +144,7 @@ fn actions() -> impl Strategy<Value = Vec<(OrderAction, u32)>> {
 
 /// Whether the vehicle is stopped by an order or a breach.
 fn is_stopped(durable: &Durable) -> bool {
-    durable.hold || durable.abort || durable.breach != 0
+    durable.hold || durable.abort || durable.limits.breach != 0
 }
 
 fn restart(trial: &mut PowerCutTrial) -> Result<(), TestCaseError> {
@@ -161,7 +161,7 @@ fn restart(trial: &mut PowerCutTrial) -> Result<(), TestCaseError> {
         prop_assert!(after.lost == before.lost);
         prop_assert!(after.abort || !before.abort);
         prop_assert!(after.hold || !before.hold);
-        prop_assert!(after.breach == before.breach);
+        prop_assert!(after.limits.breach == before.limits.breach);
     }
     Ok(())
 }

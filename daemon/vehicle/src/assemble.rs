@@ -10,7 +10,6 @@ use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::{LayerDescriptor, LayerMask, LayerSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{CellEdge, MissionId};
 use std::time::Duration;
@@ -27,8 +26,7 @@ pub fn assemble(
 ) -> Result<Vehicle, UserError> {
     let authenticity = authenticity.map(|of_file| durable.keys.begin(of_file));
     let mut link = link_config(config, authenticity, modem)?;
-    link.budget_bps = durable.budget_bps.unwrap_or(link.budget_bps);
-    link.shares = durable.shares.map_or(link.shares, Shares);
+    durable.budget.configure(&mut link);
     let codec = config.map.codec;
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
     for layer in layers(config, codec) {
@@ -47,9 +45,7 @@ pub fn assemble(
         Some(last) => Navigator::resume(last, depth, drift),
         None => at_start.with_start_sigma(config.navigation.start_sigma_m),
     };
-    link.set_background(
-        durable.background.as_deref().and_then(BackgroundOrder::from_bytes).unwrap_or(config.link.background),
-    );
+    link.set_background(durable.budget.background().unwrap_or(config.link.background));
     let mut vehicle = Vehicle::new(link, navigator, steering, policy(config), durable, now);
     vehicle.set_codec(codec);
     vehicle.configure_map(MapSelection {

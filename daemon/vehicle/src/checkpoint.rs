@@ -64,10 +64,10 @@ impl Mapper {
             model: self.model.save(),
             book: &self.book,
             words: self.extractor.measures(),
-            exemplars: &self.exemplars,
+            exemplars: &self.exemplars.store,
             cells: &self.cells,
         };
-        let registration = self.registrar.as_ref().map(Registrar::save);
+        let registration = self.placer.save();
         let measures = self.extractor.measures();
         let Self { light, online, habitats, .. } = self;
         let added = (light, registration, measures.discriminant(), online, habitats);
@@ -94,10 +94,10 @@ impl Mapper {
         let mut mapper = fresh;
         mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
         let kept_registrar = registration.and_then(registrar_of).map(|kept| kept.with_loops(config.registration.loops));
-        mapper.registrar = kept_registrar.or(mapper.registrar);
+        mapper.placer.restore(kept_registrar);
         mapper.extractor = WordExtractor::from_measures(kept_words);
         (mapper.model, mapper.book) = (model, kept.book);
-        (mapper.exemplars, mapper.cells, mapper.last_s) = (kept.exemplars, kept.cells, kept.last_s);
+        (mapper.exemplars.store, mapper.cells, mapper.last_s) = (kept.exemplars, kept.cells, kept.last_s);
         (mapper.online, mapper.habitats) = (online, habitats);
         mapper.restore_map();
         Ok(Restored { mapper, lineage: kept.lineage })

@@ -16,6 +16,7 @@ mod mapper;
 mod mosaic;
 mod navigator;
 mod picker;
+mod placer;
 pub mod planning;
 mod registration;
 mod steering;
@@ -31,10 +32,11 @@ pub use frame::Frame;
 pub use mapper::Mapper;
 pub use mosaic::FloorTile;
 pub use navigator::{FixVerdict, LastPlace, Navigator};
-pub use registration::{FoundFrame, RegisteredFrame};
+pub use placer::FoundFrame;
+pub use registration::RegisteredFrame;
 pub use scenecast_registration::CameraFinding;
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{
-    AppliedSlot, Durable, Evidence, KeptKeys, LostOrders, MapSelection, MappedFrame, Vehicle, VehicleDisk,
-    VehicleOutput,
+    AppliedSlot, Durable, Evidence, KeptBudget, KeptGoals, KeptKeys, KeptLimits, KeptUtility, LostOrders, MapSelection,
+    MappedFrame, Vehicle, VehicleDisk, VehicleOutput,
 };

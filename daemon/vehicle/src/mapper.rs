@@ -4,6 +4,7 @@ use super::cells::{CellChanges, Cells, LayerScales};
 use super::frame::{Frame, Projection};
 use super::mosaic::Mosaic;
 use super::picker::{Judge, PATCH_PX};
+use super::placer::FramePlacer;
 use crate::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame, SharedExemplars};
 use image::RgbImage;
 use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
@@ -17,7 +18,6 @@ use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LabelTree};
-use scenecast_registration::{GeometryCheck, Registrar};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -56,40 +56,94 @@ pub struct Mapper {
     /// `None` if the labels are topics.
     pub(super) habitats: Option<Habitats>,
     pub(super) book: LabelBook,
-    pub(super) exemplars: ExemplarStore,
-    /// The exemplars of the last [`Mapper::shared_exemplars`].
-    shared: SharedExemplars,
+    pub(super) exemplars: Exemplars,
     mosaic: Mosaic,
     pub(super) cells: Cells,
-    /// `None` as long as no frame was to be placed by images.
-    pub(super) registrar: Option<Registrar>,
-    /// Whether images place the frames; otherwise odometry and compass do.
-    pub(super) registers: bool,
-    /// Whether the camera is as configured, by the next frames; `None` unless that is asked, and once it was told.
-    pub(super) geometry: Option<GeometryCheck>,
+    pub(super) placer: FramePlacer,
     scales: LayerScales,
-    refine_words_per_s: f64,
-    /// Maximum rate of camera frames, 1/s; `None`: every frame.
-    frames_per_s: Option<f64>,
-    configured: Configured,
+    tuning: Tuning,
     pub(super) last_s: Option<f64>,
     pub(super) flat: Vec<FlatCell>,
 }
 
-/// The configured values that the operator's settings override.
+/// How much the model works, and the configured values that the operator's settings override.
+struct Tuning {
+    refine_words_per_s: f64,
+    /// Maximum rate of camera frames, 1/s; `None`: every frame.
+    frames_per_s: Option<f64>,
+    configured: Configured,
+}
+
+/// The configured values of the settings: alpha, beta and gamma; others as [`Tuning`] has them; the most labels.
 struct Configured {
     priors: [f64; 3],
-    registers: bool,
-    /// A registration that has placed no frame.
-    registrar: Registrar,
     refine_words_per_s: f64,
     frames_per_s: Option<f64>,
     labels: u32,
 }
 
-/// A configured frame rate, where 0 stands for every frame.
-fn every_frame_or(rate: f64) -> Option<f64> {
-    (rate > 0.0).then_some(rate)
+impl Tuning {
+    fn new(config: &Config) -> Self {
+        let scene = &config.scene;
+        let refine_words_per_s = f64::from(scene.refine_words_per_s);
+        // 0 stands for every frame.
+        let frames_per_s = (scene.frames_per_s > 0.0).then_some(scene.frames_per_s);
+        let priors = [scene.alpha, scene.beta, scene.gamma];
+        let configured = Configured { priors, refine_words_per_s, frames_per_s, labels: scene.max_labels };
+        Self { refine_words_per_s, frames_per_s, configured }
+    }
+
+    /// Takes the rates of the settings; returns their priors and the most labels.
+    fn tune(&mut self, settings: &Settings) -> ([f64; 3], u32) {
+        let or = |change: Change<ShortDecimal>, configured: f64| change.value().map_or(configured, ShortDecimal::value);
+        let Configured { priors: [alpha, beta, gamma], refine_words_per_s, frames_per_s, labels } = self.configured;
+        self.refine_words_per_s = or(settings.refine_words_per_s, refine_words_per_s);
+        self.frames_per_s = settings.frames_per_s.value().map(ShortDecimal::value).or(frames_per_s);
+        let priors = [or(settings.alpha, alpha), or(settings.beta, beta), or(settings.gamma, gamma)];
+        (priors, settings.labels.value().map_or(labels, u32::from))
+    }
+
+    /// Whether a frame at `t_s` is mapped after one at `last_s`. Each interval of the frame rate takes its first frame.
+    fn takes(&self, last_s: Option<f64>, t_s: f64) -> bool {
+        let Some(rate) = self.frames_per_s else { return true };
+        let interval = |t_s: f64| (t_s * rate + 1e-6).floor();
+        last_s.is_none_or(|last_s| interval(last_s) != interval(t_s))
+    }
+
+    /// Words to sample again after this many seconds.
+    fn words_to_refine(&self, passed_s: f64) -> u64 {
+        (self.refine_words_per_s * passed_s.clamp(0.0, 60.0)) as u64
+    }
+}
+
+/// The best patches of the labels, and the map of them that was given out last.
+pub(super) struct Exemplars {
+    pub(super) store: ExemplarStore,
+    shared: SharedExemplars,
+}
+
+impl Exemplars {
+    fn new(metres_per_pixel: f64) -> Self {
+        let store = ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX).with_distance(f64::from(PATCH_PX) * metres_per_pixel);
+        Self { store, shared: SharedExemplars::default() }
+    }
+
+    fn of_label(&self, label: u8, book: &LabelBook) -> &[ExemplarPatch] {
+        book.topic_of(label).map_or(&[], |topic| self.store.all(topic))
+    }
+
+    fn share(&mut self, book: &LabelBook) -> SharedExemplars {
+        let now = || book.labels().map(|l| (l, self.of_label(l, book))).filter(|(_, patches)| !patches.is_empty());
+        let is_same = |a: &[ExemplarPatch], b: &[ExemplarPatch]| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Arc::ptr_eq(&a.patch, &b.patch))
+        };
+        let is_current = now().count() == self.shared.len()
+            && now().zip(self.shared.iter()).all(|((l, patches), (k, last))| l == *k && is_same(patches, last));
+        if !is_current {
+            self.shared = Arc::new(now().map(|(label, patches)| (label, patches.to_vec())).collect());
+        }
+        self.shared.clone()
+    }
 }
 
 impl Mapper {
@@ -115,8 +169,6 @@ impl Mapper {
             seed,
             ..SceneConfig::for_images()
         };
-        let registrar = Registrar::new(config.navigation.drift_percent / 100.0).with_loops(config.registration.loops);
-        let registers = config.registration.enabled;
         Ok(Self {
             extractor,
             light: config.camera.flat_field.then(FlatField::default),
@@ -129,25 +181,12 @@ impl Mapper {
             online: OnlineInference::default(),
             habitats: (config.scene.labels == SceneLabels::Habitats).then(|| Habitats::new(config.scene.max_labels)),
             book: LabelBook::new(epoch),
-            exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
-                .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
-            shared: SharedExemplars::default(),
+            exemplars: Exemplars::new(config.camera.metres_per_pixel),
             mosaic: Mosaic::default(),
             cells: Cells::default(),
-            registrar: registers.then(|| registrar.clone()),
-            registers,
-            geometry: None,
+            placer: FramePlacer::new(config),
             scales: LayerScales::new(config),
-            refine_words_per_s: f64::from(config.scene.refine_words_per_s),
-            frames_per_s: every_frame_or(config.scene.frames_per_s),
-            configured: Configured {
-                priors: [config.scene.alpha, config.scene.beta, config.scene.gamma],
-                registers,
-                registrar,
-                refine_words_per_s: f64::from(config.scene.refine_words_per_s),
-                frames_per_s: every_frame_or(config.scene.frames_per_s),
-                labels: config.scene.max_labels,
-            },
+            tuning: Tuning::new(config),
             last_s: None,
             flat: Vec::new(),
         })
@@ -155,30 +194,20 @@ impl Mapper {
 
     /// Puts settings in force that were checked; those without a value are as configured. Labels keep their meaning.
     pub fn tune(&mut self, settings: &Settings) {
-        let or = |change: Change<ShortDecimal>, configured: f64| change.value().map_or(configured, ShortDecimal::value);
-        let [alpha, beta, gamma] = self.configured.priors;
-        let priors = (or(settings.alpha, alpha), or(settings.beta, beta), or(settings.gamma, gamma));
-        if let Err(e) = self.model.set_priors(priors.0, priors.1, priors.2) {
+        let ([alpha, beta, gamma], labels) = self.tuning.tune(settings);
+        if let Err(e) = self.model.set_priors(alpha, beta, gamma) {
             // The range of the settings lies within the range of the model.
             tracing::error!("the scene model keeps its priors: {e}");
         }
         if let Some(habitats) = &mut self.habitats {
-            habitats.limit(settings.labels.value().map_or(self.configured.labels, u32::from));
+            habitats.limit(labels);
         }
-        self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
-        let registration = settings.registration.value().map(|choice| choice == Registration::On);
-        self.registers = registration.unwrap_or(self.configured.registers);
-        if self.registers && self.registrar.is_none() {
-            self.registrar = Some(self.configured.registrar.clone());
-        }
-        self.frames_per_s = settings.frames_per_s.value().map(ShortDecimal::value).or(self.configured.frames_per_s);
+        self.placer.switch(settings.registration.value().map(|choice| choice == Registration::On));
     }
 
     /// Whether the frame of mission time `t_s` is to be mapped. Each interval of the frame rate takes its first frame.
     pub fn takes(&self, t_s: f64) -> bool {
-        let Some(rate) = self.frames_per_s else { return true };
-        let interval = |t_s: f64| (t_s * rate + 1e-6).floor();
-        self.last_s.is_none_or(|last_s| interval(last_s) != interval(t_s))
+        self.tuning.takes(self.last_s, t_s)
     }
 
     /// The priors in force: alpha, beta, gamma.
@@ -211,17 +240,17 @@ impl Mapper {
             self.cells.see(cell, -seen.z, t_s);
         }
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
-        self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
+        self.model.refine(self.tuning.words_to_refine(passed));
         self.flat = self.online.learn(t_s, &self.model);
         self.add_habitats(image, &projection, &pose, cell_px);
         let metres_per_pixel = projection.metres_per_pixel();
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
-        judge.review(&mut self.exemplars);
+        judge.review(&mut self.exemplars.store);
         let place = |u: f32, v: f32| {
             let centre = [Word { id: 0, u, v }];
             projection.project(image.dimensions(), &pose, &centre).first().map(|seen| (seen.x, seen.y))
         };
-        judge.offer(&mut self.exemplars, image, place, t_s);
+        judge.offer(&mut self.exemplars.store, image, place, t_s);
         self.publish(t_s, pose)
     }
 
@@ -296,22 +325,13 @@ impl Mapper {
 
     /// The best exemplars of a label, the best first.
     pub fn exemplars(&self, label: u8) -> &[ExemplarPatch] {
-        self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
+        self.exemplars.of_label(label, &self.book)
     }
 
     /// The best exemplars of all labels. The same map is given out until an exemplar comes, goes or changes its rank;
     /// scores are as they were then.
     pub fn shared_exemplars(&mut self) -> SharedExemplars {
-        let now = || self.book.labels().map(|l| (l, self.exemplars(l))).filter(|(_, patches)| !patches.is_empty());
-        let is_same = |a: &[ExemplarPatch], b: &[ExemplarPatch]| {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Arc::ptr_eq(&a.patch, &b.patch))
-        };
-        let is_current = now().count() == self.shared.len()
-            && now().zip(self.shared.iter()).all(|((l, patches), (k, last))| l == *k && is_same(patches, last));
-        if !is_current {
-            self.shared = Arc::new(now().map(|(label, patches)| (label, patches.to_vec())).collect());
-        }
-        self.shared.clone()
+        self.exemplars.share(&self.book)
     }
 
     pub fn cells(&self) -> usize {

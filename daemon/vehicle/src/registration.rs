@@ -2,13 +2,11 @@
 
 use crate::frame::{Frame, Nadir};
 use crate::mapper::Mapper;
+use crate::placer::FoundFrame;
 use scene_model::project::Pose;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::wire::{FrameTie, RegistrationReport};
-use scenecast_registration::{CameraFinding, CameraImage, FrameInput, GeometryCheck, Placed, Registrar, Tally};
-
-/// Standard deviation of the position after a gap in dead reckoning, metres.
-const GAP_SIGMA_M: f64 = 3.0;
+use scenecast_registration::{CameraFinding, CameraImage, FrameInput, Tally};
 
 /// A frame's place on the map.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,16 +18,6 @@ pub struct RegisteredFrame {
     pub dead_reckoned: MapPoint,
     /// What the registration found; `None` where frames were never registered.
     pub found: Option<FoundFrame>,
-}
-
-/// A frame's place by the registration.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FoundFrame {
-    pub placed: Placed,
-    /// Frames that closed a loop since the mission's start.
-    pub closed: u32,
-    /// Whether images place frames; otherwise the registration was switched off.
-    pub is_on: bool,
 }
 
 impl RegisteredFrame {
@@ -75,53 +63,46 @@ impl Mapper {
         }
         let metres_per_pixel = scale * self.metres_per_pixel();
         let image = CameraImage::rgb(size.0 as usize, size.1 as usize, frame.image.as_raw());
-        let (Some(registrar), Some(image)) = (&mut self.registrar, image) else { return unregistered };
+        let Some(image) = image else { return unregistered };
         let above = nadir.map_or(pose, |nadir| nadir.above(&pose));
         let (place, compass_rad) = (MapPoint::new(above.x, above.y), -pose.yaw_rad);
         let input = FrameInput { image, metres_per_pixel, dead_reckoned: place, compass_rad };
-        if let Some(geometry) = &mut self.geometry {
-            geometry.handle_frame(&input);
-        }
-        let placed =
-            if self.registers { registrar.handle_frame(&input) } else { registrar.handle_unmatched_frame(&input) };
+        let Some(found) = self.placer.place(&input) else { return unregistered };
+        let placed = &found.placed;
         let (x, y) = placed.pose.at().xy();
         let above = Pose { x, y, z: pose.z, yaw_rad: -placed.pose.heading_rad };
         RegisteredFrame {
             pose: nadir.map_or(above, |nadir| nadir.camera(&above, placed.pose.scale())),
             scale: scale * placed.pose.scale(),
-            found: Some(FoundFrame { closed: registrar.tally().looped, is_on: self.registers, placed }),
+            found: Some(found),
             ..unregistered
         }
     }
 
     /// The vehicle may have moved unmeasured, so that dead reckoning continues at another place.
     pub fn handle_gap(&mut self) {
-        self.registrar.iter_mut().for_each(|registrar| registrar.handle_gap(GAP_SIGMA_M));
+        self.placer.handle_gap();
     }
 
     /// The next frames are to show whether the camera is as configured. A simulated one is.
     pub fn check_camera(&mut self) {
-        self.geometry = Some(GeometryCheck::default());
+        self.placer.check_camera();
     }
 
     /// What people should know of the camera, once its first frames and odometry have shown it.
     pub fn poll_camera_finding(&mut self) -> Option<CameraFinding> {
         let metres_per_pixel = self.metres_per_pixel();
-        let geometry = self.geometry.as_mut()?;
-        let finding = geometry.poll_finding(metres_per_pixel);
-        self.geometry.take_if(|geometry| geometry.is_complete());
-        finding
+        self.placer.poll_finding(metres_per_pixel)
     }
 
     /// What people should know of the camera by all of a recording, if its frames have shown it and it was not told.
     pub fn last_camera_finding(&self) -> Option<CameraFinding> {
-        let found = self.geometry.as_ref()?.geometry()?;
-        Some(found.finding(self.metres_per_pixel()))
+        self.placer.last_finding(self.metres_per_pixel())
     }
 
     /// The evidence of the registration so far; `None` without registration.
     pub fn registration(&self) -> Option<Tally> {
-        self.registrar.as_ref().map(Registrar::tally)
+        self.placer.tally()
     }
 }
 

@@ -18,7 +18,7 @@ pub use pair::HOLDER_SILENCE;
 use pair::{AckRoom, Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
 pub use slots::{Admission, SeriesRecord, SlotInbox, SlotInboxState};
-pub use stats::{DropReason, Goodput, LinkStats, Loss};
+pub use stats::{DropReason, Goodput, LinkQuality, LinkStats, Loss};
 pub use surface::{
     Cycle, EndedRun, InForce, IssueError, OtherSurface, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink,
 };

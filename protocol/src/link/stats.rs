@@ -78,14 +78,10 @@ pub struct LinkStats {
     pub peer_restarts: u64,
     /// Times that the states of the two ends were found to differ, so that all was sent again.
     pub resyncs: u64,
-    /// Recent loss of own frames, as the peer reports it.
-    pub loss_out: Loss,
-    /// Recent loss of the peer's frames, by the gaps in their numbers.
-    pub loss_in: Loss,
-    /// Useful bits that the peer declared received.
-    pub goodput_out: Goodput,
-    /// Useful bits of accepted frames.
-    pub goodput_in: Goodput,
+    /// The quality of the link to the peer, as the peer declares it.
+    pub outgoing: LinkQuality,
+    /// The quality of the link from the peer: loss by the gaps in its frame numbers, bits of accepted frames.
+    pub incoming: LinkQuality,
 }
 
 impl LinkStats {
@@ -113,19 +109,19 @@ impl LinkStats {
     pub fn receive(&mut self, class: Class, bytes: usize, now: Instant) {
         *self.received_by_class.entry(class).or_default() += bytes as u64;
         if class != Class::Overhead {
-            self.goodput_in.count(bytes, now);
+            self.incoming.goodput.count(bytes, now);
         }
     }
 
     /// Counts bytes of a chunk that the peer declared received.
     pub fn deliver(&mut self, class: Class, bytes: usize, now: Instant) {
         *self.delivered_by_class.entry(class).or_default() += bytes as u64;
-        self.goodput_out.count(bytes, now);
+        self.outgoing.goodput.count(bytes, now);
     }
 
     pub(super) fn judge(&mut self, delivered: bool) {
         *(if delivered { &mut self.frames_delivered } else { &mut self.frames_lost }) += 1;
-        self.loss_out.count(!delivered);
+        self.outgoing.loss.count(!delivered);
     }
 
     /// Counts an accepted frame; `before` was the highest number until then.
@@ -133,9 +129,9 @@ impl LinkStats {
         self.frames_received += 1;
         self.frames_numbered += number.saturating_sub(before);
         for _ in 0..number.saturating_sub(before + 1).min(256) {
-            self.loss_in.count(true);
+            self.incoming.loss.count(true);
         }
-        self.loss_in.count(false);
+        self.incoming.loss.count(false);
     }
 
     /// The share of lost frames among those of known fate, in 0..=1.
@@ -143,6 +139,15 @@ impl LinkStats {
         let judged = self.frames_lost + self.frames_delivered;
         if judged == 0 { 0.0 } else { self.frames_lost as f64 / judged as f64 }
     }
+}
+
+/// The recent quality of one direction of a link.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LinkQuality {
+    /// Lost frames.
+    pub loss: Loss,
+    /// Useful bits that arrived.
+    pub goodput: Goodput,
 }
 
 /// The recent share of lost frames.

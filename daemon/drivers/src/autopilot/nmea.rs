@@ -30,12 +30,7 @@ const UNKNOWN_AFTER: Duration = Duration::from_secs(3);
 pub struct Nmea {
     gps: Gps,
     lines: Lines,
-    /// Whether answers are expected; not of a file.
-    answers: bool,
-    silence: Duration,
-    heard: Option<Instant>,
-    /// Lasts while no sentence has ever come in, and is noted after `silence`.
-    absence: Lasting,
+    contact: Contact,
     soundings: Soundings,
     /// Lasts while no compass gives a heading, and is noted after [`UNKNOWN_AFTER`].
     heading_absence: Lasting,
@@ -48,7 +43,53 @@ pub struct Nmea {
     has_order: bool,
     second: Instant,
     outbox: Outbox,
+}
+
+/// Whether sentences come in, and what was noted of it.
+#[derive(Debug)]
+struct Contact {
+    /// Whether answers are expected; not of a file.
+    answers: bool,
+    silence: Duration,
+    heard: Option<Instant>,
+    /// Lasts while no sentence has ever come in, and is noted after `silence`.
+    absence: Lasting,
     was_silent: bool,
+}
+
+impl Contact {
+    fn new(answers: bool, silence: Duration) -> Self {
+        Self { answers, silence, heard: None, absence: Lasting::default(), was_silent: false }
+    }
+
+    fn handle_sentence(&mut self, outbox: &mut Outbox, now: Instant) {
+        if self.heard.is_none() || self.was_silent {
+            outbox.note("the autopilot answers");
+        }
+        (self.heard, self.was_silent) = (Some(now), false);
+    }
+
+    /// Notices that no sentence comes in, or none any more.
+    fn watch(&mut self, health: Health, outbox: &mut Outbox, now: Instant) {
+        if health == Health::Awaited && self.absence.is_news(self.silence, now) {
+            outbox.note(absence_text("sentence", self.silence));
+        }
+        if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
+            outbox.count("silences");
+            outbox.note("the autopilot does not answer any more");
+        }
+    }
+
+    /// The health; `is_position_lost`: sentences come in without a position.
+    fn health(&self, is_position_lost: bool, now: Instant) -> Health {
+        match self.heard {
+            _ if !self.answers => Health::InCommand,
+            None => Health::Awaited,
+            Some(at) if now.since(at) >= self.silence => Health::Silent,
+            Some(_) if is_position_lost => Health::NotInCommand,
+            Some(_) => Health::InCommand,
+        }
+    }
 }
 
 impl Nmea {
@@ -57,10 +98,7 @@ impl Nmea {
         Self {
             gps: Gps::new(GpsLanguage::Nmea),
             lines: Lines::new(nmea::MAX_LINE),
-            answers,
-            silence,
-            heard: None,
-            absence: Lasting::default(),
+            contact: Contact::new(answers, silence),
             soundings: Soundings::default(),
             heading_absence: Lasting::default(),
             hears_magnetic: false,
@@ -70,7 +108,6 @@ impl Nmea {
             has_order: false,
             second: now,
             outbox: Outbox::default(),
-            was_silent: false,
         }
     }
 
@@ -152,7 +189,7 @@ impl Nmea {
 
     /// Whether it has reported positions, and does not any more; of a receiver that never had one `Gps` gives the reason.
     fn is_position_lost(&self, now: Instant) -> bool {
-        self.at.is_some_and(|(_, at)| now.since(at) >= self.silence)
+        self.at.is_some_and(|(_, at)| now.since(at) >= self.contact.silence)
     }
 }
 
@@ -169,10 +206,7 @@ impl Autopilot for Nmea {
         for line in lines {
             for fields in nmea::sentences(&line).filter_map(|sentence| nmea::fields(sentence).ok()) {
                 self.handle_sensor(&fields, now);
-                if self.heard.is_none() || self.was_silent {
-                    self.outbox.note("the autopilot answers");
-                }
-                (self.heard, self.was_silent) = (Some(now), false);
+                self.contact.handle_sentence(&mut self.outbox, now);
             }
             for fix in self.gps.handle_bytes(&[&line[..], b"\n"].concat(), now) {
                 self.handle_place_of_vehicle(fix.place, now);
@@ -197,13 +231,7 @@ impl Autopilot for Nmea {
         if health == Health::NotInCommand {
             self.watch_position(now);
         }
-        if health == Health::Awaited && self.absence.is_news(self.silence, now) {
-            self.outbox.note(absence_text("sentence", self.silence));
-        }
-        if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
-            self.outbox.count("silences");
-            self.outbox.note("the autopilot does not answer any more");
-        }
+        self.contact.watch(health, &mut self.outbox, now);
     }
 
     fn poll_timeout(&self) -> Instant {
@@ -222,13 +250,7 @@ impl Autopilot for Nmea {
     fn handle_place(&mut self, _place: LatLon, _sigma_m: f64, _now: Instant) {}
 
     fn health(&self, now: Instant) -> Health {
-        match self.heard {
-            _ if !self.answers => Health::InCommand,
-            None => Health::Awaited,
-            Some(at) if now.since(at) >= self.silence => Health::Silent,
-            Some(_) if self.is_position_lost(now) => Health::NotInCommand,
-            Some(_) => Health::InCommand,
-        }
+        self.contact.health(self.is_position_lost(now), now)
     }
 
     fn counters(&self) -> Counters {

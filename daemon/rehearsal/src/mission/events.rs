@@ -73,7 +73,7 @@ impl Mission {
                     if matches!(output, SurfaceOutput::MapChanged(_)) {
                         self.meters.note_operator_change();
                     }
-                    self.events.push(output);
+                    self.logbook.outputs.push(output);
                 }
                 SurfaceHostEvent::Frame(event) => {
                     if let FrameEvent::Received { frame, .. } = &event {
@@ -215,7 +215,7 @@ impl Mission {
         let changes = self.mapper.handle_frame(&frame.placed(&placed), t_s);
         self.vehicle.handle_changes(&changes, now);
         self.vehicle.handle_exemplars(self.mapper.shared_exemplars(), now);
-        self.logbook.note_changes(self.vehicle.vehicle(), &changes, now);
+        self.logbook.map.note_changes(self.vehicle.vehicle(), &changes, now);
         Ok(())
     }
 

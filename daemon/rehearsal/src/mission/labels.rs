@@ -132,7 +132,7 @@ impl Mission {
         if is_changed {
             let changes = labels.map.take_changes(usize::MAX);
             self.vehicle.handle_changes(&changes, now);
-            self.logbook.note_changes(self.vehicle.vehicle(), &changes, now);
+            self.logbook.map.note_changes(self.vehicle.vehicle(), &changes, now);
         }
     }
 

@@ -8,6 +8,7 @@ use scenecast_protocol::link::PeerView;
 use scenecast_protocol::map::{Cell, LabelGrid, UNEXPLORED};
 use scenecast_protocol::time::Instant;
 use scenecast_registration::FrameGraph;
+use scenecast_surface::SurfaceOutput;
 use scenecast_vehicle::{AppliedSlot, MapChanges, Vehicle};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -39,31 +40,56 @@ pub(crate) struct Logbook {
     pub(crate) poses: Vec<FramePoses>,
     /// All registered frames, to place them together after the survey.
     pub(crate) graph: FrameGraph,
-    /// The labels of the vehicle's map as its producers have given them.
-    pub(crate) labels: GivenLabels,
-    /// Bytes that the map would have taken as a PNG file at each of its versions.
-    pub(crate) png_full_bytes: u64,
-    map_version: u64,
-    /// Changes of the label of a cell that had one on the published map.
-    pub(crate) flips: u64,
-    /// Mission time of the first map with the cell, seconds.
-    pub(crate) first_seen_s: BTreeMap<Cell, f64>,
+    /// The vehicle's map as its producers have given it.
+    pub(crate) map: GivenMap,
     /// Bits on air of the frames that the surface received.
     pub(crate) received_bits: u64,
     /// What people should change at the camera.
     pub(crate) camera_advice: Option<String>,
     /// The events of both ends and their times, if they are kept.
     pub(crate) events: Option<Vec<(Instant, EndEvent)>>,
+    /// Events of the surface since they were last taken.
+    pub(super) outputs: Vec<SurfaceOutput>,
     /// Frames of a recording that cannot be read: how many, and why the first one.
     pub(crate) unreadable: Option<(u64, String)>,
 }
 
-/// Labels of a map, their epoch and the highest of them.
+/// The labels of a map, and how they changed.
 #[derive(Default)]
-pub(crate) struct GivenLabels {
+pub(crate) struct GivenMap {
     cells: LabelGrid,
     epoch: u8,
+    /// The highest label.
     pub(crate) highest: u8,
+    /// Bytes that the map would have taken as a PNG file at each of its versions.
+    pub(crate) png_full_bytes: u64,
+    version: u64,
+    /// Changes of the label of a cell that had one on the published map.
+    pub(crate) flips: u64,
+    /// Mission time of the first map with the cell, seconds.
+    pub(crate) first_seen_s: BTreeMap<Cell, f64>,
+}
+
+impl GivenMap {
+    /// The vehicle has taken changes of the map.
+    pub(super) fn note_changes(&mut self, vehicle: &Vehicle, changes: &MapChanges, now: Instant) {
+        let Some(labels) = &changes.labels else { return };
+        if vehicle.map_version() != self.version {
+            self.version = vehicle.map_version();
+            let png = scenecast_core::label_picture::encode(vehicle.map());
+            self.png_full_bytes += png.map_or(0, |png| png.len() as u64);
+        }
+        if std::mem::replace(&mut self.epoch, labels.epoch) != labels.epoch {
+            self.cells.clear();
+        }
+        for &(cell, label) in &labels.cells {
+            match self.cells.set(cell, label) {
+                UNEXPLORED => _ = self.first_seen_s.entry(cell).or_insert(now.as_secs_f64()),
+                before => self.flips += u64::from(before != label),
+            }
+        }
+        self.highest = labels.highest;
+    }
 }
 
 /// An event of one of the ends.
@@ -97,26 +123,6 @@ impl Logbook {
         for slot in view.slots() {
             self.issued.entry((slot.id, slot.version)).or_insert(slot.issued);
         }
-    }
-
-    /// The vehicle has taken changes of the map.
-    pub(super) fn note_changes(&mut self, vehicle: &Vehicle, changes: &MapChanges, now: Instant) {
-        let Some(labels) = &changes.labels else { return };
-        if vehicle.map_version() != self.map_version {
-            self.map_version = vehicle.map_version();
-            let png = scenecast_core::label_picture::encode(vehicle.map());
-            self.png_full_bytes += png.map_or(0, |png| png.len() as u64);
-        }
-        if std::mem::replace(&mut self.labels.epoch, labels.epoch) != labels.epoch {
-            self.labels.cells.clear();
-        }
-        for &(cell, label) in &labels.cells {
-            match self.labels.cells.set(cell, label) {
-                UNEXPLORED => _ = self.first_seen_s.entry(cell).or_insert(now.as_secs_f64()),
-                before => self.flips += u64::from(before != label),
-            }
-        }
-        self.labels.highest = labels.highest;
     }
 }
 

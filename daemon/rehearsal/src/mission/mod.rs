@@ -59,8 +59,6 @@ pub struct Mission {
     anchored: Anchored,
     pub(crate) carrier: Carrier,
     script: Script,
-    /// Events of the surface since the last [`Mission::take_events`].
-    events: Vec<SurfaceOutput>,
     pub(crate) logbook: Logbook,
     pub(crate) meters: Meters,
     times: Timetable,
@@ -95,7 +93,6 @@ impl Mission {
             address: scenecast_config::vehicle_address(&config)?,
             script: script(&config, area),
             times: Timetable::new(&config, now),
-            events: Vec::new(),
             logbook: Logbook::default(),
             meters: Meters::default(),
             config,
@@ -149,7 +146,7 @@ impl Mission {
 
     /// Changes of the label of a cell that had one on the vehicle's published map.
     pub fn flips(&self) -> u64 {
-        self.logbook.flips
+        self.logbook.map.flips
     }
 
     /// Bits on air of the frames that the surface received.
@@ -222,7 +219,7 @@ impl Mission {
 
     /// Events of the surface since the last call.
     pub fn take_events(&mut self) -> Vec<SurfaceOutput> {
-        std::mem::take(&mut self.events)
+        std::mem::take(&mut self.logbook.outputs)
     }
 
     /// Whether the survey has ended and the operator's map is complete.

@@ -119,7 +119,7 @@ impl Mission {
         let cell_m = self.cell_m();
         let timed = |(cell, label): (Cell, u8)| {
             let class = u32::from(self.camera.world.class_of(cell, cell_m)?);
-            let first_seen_s = *self.logbook.first_seen_s.get(&cell)?;
+            let first_seen_s = *self.logbook.map.first_seen_s.get(&cell)?;
             Some(((cell.x, cell.y), TimedCell { label: label.into(), class, first_seen_s }))
         };
         Seams::of(&self.vehicle().map().iter().filter_map(timed).collect())

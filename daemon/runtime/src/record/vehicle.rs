@@ -236,7 +236,7 @@ impl VehicleRecorder {
             budget_bps: vehicle.budget_bps(),
             sent_bps: f32::NAN,
             received_bps: f32::NAN,
-            loss: stats.loss_out.expected() as f32,
+            loss: stats.outgoing.loss.expected() as f32,
             round_trip_s: f32::NAN,
             age_s: f32::NAN,
             backlog_bits: 0,

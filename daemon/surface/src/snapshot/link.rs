@@ -74,14 +74,14 @@ pub(super) fn channel(view: &PeerView<'_>, now: Instant) -> VehicleChannel {
         goodput_bps: goodput.bits_per_s(now).round(),
     };
     VehicleChannel {
-        up: quality(&stats.loss_in, &stats.goodput_in),
-        down: quality(&stats.loss_out, &stats.goodput_out),
+        up: quality(&stats.incoming.loss, &stats.incoming.goodput),
+        down: quality(&stats.outgoing.loss, &stats.outgoing.goodput),
         round_trip_s: view.round_trip().map(|d| d.as_secs_f64()),
         one_way_s: view.round_trip().map(|d| d.as_secs_f64() / 2.0),
         clock_offset_s: view.clock().map(|c| clock_offset_s(c, now)),
         mismatch: view.mismatch(now).map(|mismatch| mismatch.to_string()),
         dropped: dropped(stats).into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
-        backlog: view.backlog().map(|(b, at)| backlog(b, at, stats.goodput_in.bits_per_s(now), now)),
+        backlog: view.backlog().map(|(b, at)| backlog(b, at, stats.incoming.goodput.bits_per_s(now), now)),
     }
 }
 

@@ -25,12 +25,8 @@ pub(crate) struct RunReport {
     labels: usize,
     labels_used: usize,
     perplexity: Option<f64>,
-    mutual_information_nats: Option<f64>,
-    normalised_mutual_information: Option<f64>,
-    homogeneity: Option<f64>,
-    completeness: Option<f64>,
-    v_measure: Option<f64>,
-    null_mutual_information_nats: Option<f64>,
+    #[serde(flatten)]
+    agreement: Agreement,
     peak_rss_bytes: u64,
     kernel: Option<&'static str>,
 }
@@ -55,14 +51,35 @@ impl RunReport {
             labels: topics.map_or(used, SceneModel::labels),
             labels_used: used,
             perplexity: topics.map(SceneModel::perplexity),
-            mutual_information_nats: quality.map(|q| q.mutual_information.nats),
-            normalised_mutual_information: quality.map(|q| q.mutual_information.normalised),
-            homogeneity: quality.map(|q| q.mutual_information.homogeneity()),
-            completeness: quality.map(|q| q.mutual_information.completeness()),
-            v_measure: quality.map(|q| q.mutual_information.v_measure()),
-            null_mutual_information_nats: quality.map(|q| q.null_nats),
+            agreement: Agreement::of(quality),
             peak_rss_bytes: peak_rss_bytes(),
             kernel: topics.map(|model| model.kernel().name()),
+        }
+    }
+}
+
+/// The agreement of the labels with the annotations; each `None` where nothing is annotated.
+#[derive(Debug, Serialize)]
+struct Agreement {
+    mutual_information_nats: Option<f64>,
+    normalised_mutual_information: Option<f64>,
+    homogeneity: Option<f64>,
+    completeness: Option<f64>,
+    v_measure: Option<f64>,
+    /// The mutual information of labels that are as good as chance.
+    null_mutual_information_nats: Option<f64>,
+}
+
+impl Agreement {
+    fn of(quality: Option<&Quality>) -> Self {
+        let information = quality.map(|q| &q.mutual_information);
+        Self {
+            mutual_information_nats: information.map(|i| i.nats),
+            normalised_mutual_information: information.map(|i| i.normalised),
+            homogeneity: information.map(|i| i.homogeneity()),
+            completeness: information.map(|i| i.completeness()),
+            v_measure: information.map(|i| i.v_measure()),
+            null_mutual_information_nats: quality.map(|q| q.null_nats),
         }
     }
 }

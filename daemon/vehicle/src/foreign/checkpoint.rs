@@ -63,7 +63,7 @@ impl ForeignMap {
             votes: self.votes.clone(),
             labels: pack(self.labels.grid()),
             erased: pack(&self.erased),
-            bands: self.bands.values().map(band).collect(),
+            bands: self.bands.iter().map(band).collect(),
             classes: self.classes.values().map(|entry| (entry.label(), entry.to_bytes())).collect(),
         };
         ENVELOPE.seal(&postcard::to_allocvec(&content).unwrap_or_default())
@@ -79,9 +79,8 @@ impl ForeignMap {
         }
         for (descriptor, levels, erased) in &content.bands {
             let descriptor = LayerDescriptor::from_bytes(descriptor).ok_or(ForeignRestoreError::Inconsistent)?;
-            let name = descriptor.name.clone().into_owned();
             let levels = ChangingGrid::new(unpack(levels));
-            map.bands.insert(name, BandMap { descriptor, levels, erased: unpack(erased) });
+            map.bands.restore(BandMap { descriptor, levels, erased: unpack(erased) });
         }
         for (label, bytes) in &content.classes {
             let entry = ClassEntry::from_bytes(*label, bytes).ok_or(ForeignRestoreError::Inconsistent)?;

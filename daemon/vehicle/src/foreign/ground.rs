@@ -1,7 +1,7 @@
 //! The values of a grid in the cells of the map, the part that the vehicle has been given, and the votes of segmented images.
 
 use scenecast_labels::{Ground, Raster, Refusal};
-use scenecast_protocol::map::{Cell, LabelGrid, TILE};
+use scenecast_protocol::map::{Cell, LabelGrid, TILE, UNEXPLORED};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -189,6 +189,21 @@ impl Votes {
     /// A grid states the class of a cell, so that earlier images no longer count.
     pub(super) fn forget(&mut self, cell: (i32, i32)) {
         self.0.remove(&cell);
+    }
+}
+
+/// Refuses `cells` of which so many are neither in `known` nor in `erased` that the three are more than `most`.
+pub(super) fn check_room(
+    known: &LabelGrid,
+    erased: &LabelGrid,
+    cells: impl Iterator<Item = Cell>,
+    most: usize,
+) -> Result<(), Refusal> {
+    let is_new = |cell: &Cell| known.get(*cell) == UNEXPLORED && erased.get(*cell) == UNEXPLORED;
+    let more = cells.filter(is_new).count();
+    match more > 0 && more + known.explored() + erased.explored() > most {
+        true => Err(Refusal::FullMap(most)),
+        false => Ok(()),
     }
 }
 

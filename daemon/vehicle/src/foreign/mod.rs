@@ -7,14 +7,14 @@ mod checkpoint;
 mod ground;
 
 use crate::{LabelChanges, MapChanges, MapProducer};
-use band::BandMap;
+use band::BandMaps;
 pub use checkpoint::ForeignRestoreError;
-use ground::{CellVotes, ChangingGrid, GroundRaster, Votes};
+use ground::{CellVotes, ChangingGrid, GroundRaster, Votes, check_room};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::words::Word;
-use scenecast_config::{BandRange, Config, LabelSource, Votes as VotesKept, cell_m};
-use scenecast_labels::{Band, BandScale, Content, Ground, ImagePose, Item, QuantityBand, Raster, Refusal};
-use scenecast_protocol::map::{BUILT_IN_LAYERS, Cell, ClassEntry, LabelGrid, LayerDescriptor, LayerId, UNEXPLORED};
+use scenecast_config::{Config, LabelSource, Votes as VotesKept, cell_m};
+use scenecast_labels::{Content, Ground, ImagePose, Item, Raster, Refusal};
+use scenecast_protocol::map::{Cell, ClassEntry, LabelGrid, UNEXPLORED};
 use std::collections::BTreeMap;
 
 /// A cell without a class.
@@ -40,16 +40,13 @@ pub struct ForeignMap {
     max_cells: usize,
     camera: DownCamera,
     is_newest_only: bool,
-    band_share: u8,
-    /// Scales of bands that state none.
-    scales: BTreeMap<String, BandScale>,
     votes: Votes,
     labels: ChangingGrid,
     /// The highest label so far.
     highest: u8,
     /// Cells that had a label and have none any more.
     erased: LabelGrid,
-    bands: BTreeMap<String, BandMap>,
+    bands: BandMaps,
     classes: BTreeMap<u8, ClassEntry>,
     last_s: Option<f64>,
     /// The name of the last item of each source that has one.
@@ -75,13 +72,11 @@ impl ForeignMap {
                 altitude_m: config.survey.altitude_m,
             },
             is_newest_only: config.labels.votes == VotesKept::Newest,
-            band_share: config.bands.share,
-            scales: config.bands.ranges.iter().filter_map(scale).collect(),
             votes: Votes::default(),
             labels: ChangingGrid::default(),
             highest: 0,
             erased: LabelGrid::default(),
-            bands: BTreeMap::new(),
+            bands: BandMaps::new(config),
             classes: BTreeMap::new(),
             last_s: None,
             marks: [None, None],
@@ -111,8 +106,12 @@ impl ForeignMap {
                 self.see(classes, pose, metres_per_pixel.unwrap_or(self.camera.metres_per_pixel))?;
             }
             Content::Grid { ground, classes } => self.state(classes, *ground)?,
-            Content::Band { band, ground, levels } => self.take_band(band, *ground, levels)?,
-            Content::Quantities { band, ground, quantities } => self.take_quantities(band, *ground, quantities)?,
+            Content::Band { band, ground, levels } => {
+                self.bands.take_band(band, *ground, levels, self.cell_m, self.max_cells)?;
+            }
+            Content::Quantities { band, ground, quantities } => {
+                self.bands.take_quantities(band, *ground, quantities, self.cell_m, self.max_cells)?;
+            }
         }
         self.classes.extend(item.classes.iter().map(|entry| (entry.label(), entry.clone())));
         self.last_s = Some(t_s);
@@ -202,69 +201,18 @@ impl ForeignMap {
         }
     }
 
-    fn take_band(&mut self, band: &Band, ground: Ground, levels: &Raster) -> Result<(), Refusal> {
-        let layer = band::descriptor(band, self.next_share());
-        self.check_layer(&layer)?;
-        let levels = band::levels(band, ground, levels, self.cell_m)?;
-        self.take_levels(layer, &levels)
-    }
-
-    fn take_quantities(&mut self, band: &QuantityBand, ground: Ground, map: &Raster<f32>) -> Result<(), Refusal> {
-        let known = self.bands.get(&band.name).map(|map| &map.descriptor);
-        // A program may publish a layer before it has measured any of it.
-        if known.is_none() && !map.values.iter().any(|quantity| quantity.is_finite()) {
-            return Ok(());
-        }
-        let configured = self.scales.get(&band.name).copied();
-        let layer = band::quantity_layer(band, map, known, configured, self.next_share())?;
-        self.check_layer(&layer)?;
-        let levels = band::levels_of(&layer, ground, map, self.cell_m)?;
-        self.take_levels(layer, &levels)
-    }
-
-    /// The share of a new band: the configured one, or what the others have left.
-    fn next_share(&self) -> u8 {
-        let used: u32 = self.bands.values().map(|map| u32::from(map.descriptor.share)).sum();
-        self.band_share.min(100u32.saturating_sub(used) as u8)
-    }
-
-    /// Refuses a layer of another scale than before, and one beyond those of a map.
-    fn check_layer(&self, layer: &LayerDescriptor) -> Result<(), Refusal> {
-        let name = layer.name.to_string();
-        let Some(BandMap { descriptor: known, .. }) = self.bands.get(&name) else {
-            // The built-in layers have their own indexes.
-            let more = self.bands.keys().filter(|name| !band::is_built_in(name)).count();
-            let is_full = !band::is_built_in(&name) && more + BUILT_IN_LAYERS.len() >= LayerId::COUNT;
-            return if is_full { Err(Refusal::TooManyBands(name)) } else { Ok(()) };
-        };
-        let is_same = LayerDescriptor { share: known.share, ..layer.clone() } == *known;
-        if is_same { Ok(()) } else { Err(Refusal::OtherBand(name)) }
-    }
-
-    fn take_levels(&mut self, layer: LayerDescriptor, levels: &[(Cell, u8)]) -> Result<(), Refusal> {
-        let name = layer.name.to_string();
-        let more = levels.iter().filter(|(_, level)| *level != UNEXPLORED).map(|&(cell, _)| cell);
-        match self.bands.get(&name) {
-            Some(map) => check_room(map.levels.grid(), &map.erased, more, self.max_cells)?,
-            None => check_room(&LabelGrid::default(), &LabelGrid::default(), more, self.max_cells)?,
-        }
-        self.bands.entry(name).or_insert_with(|| BandMap::new(layer)).take(levels);
-        Ok(())
-    }
-
     /// Whether cells may have changed since the last update.
     pub fn has_changes(&self) -> bool {
-        self.labels.has_changes() || self.bands.values().any(|band| band.levels.has_changes())
+        self.labels.has_changes() || self.bands.has_changes()
     }
 
     /// Gives away about `most` changed cells of the labels, and as many of each band. A band without any is there too.
     pub fn take_changes(&mut self, most: usize) -> MapChanges {
         let (epoch, highest) = (self.epoch, self.highest);
         let labels = LabelChanges { epoch, highest, cells: self.labels.take(most), tree: None };
-        let levels = |band: &mut BandMap| (band.descriptor.clone(), band.levels.take(most));
         MapChanges {
             labels: self.has_labels.then_some(labels),
-            bands: self.bands.values_mut().map(levels).collect(),
+            bands: self.bands.take_changes(most),
             classes: self.classes.values().cloned().collect(),
             ..MapChanges::default()
         }
@@ -296,25 +244,6 @@ impl MapProducer for ForeignMap {
 
     fn save(&self, lineage: u64) -> Vec<u8> {
         self.encode(lineage)
-    }
-}
-
-fn scale(range: &BandRange) -> Option<(String, BandScale)> {
-    Some((range.band.clone(), BandScale::between(range.low, range.high)?))
-}
-
-/// Refuses `cells` of which so many are neither in `known` nor in `erased` that the three are more than `most`.
-fn check_room(
-    known: &LabelGrid,
-    erased: &LabelGrid,
-    cells: impl Iterator<Item = Cell>,
-    most: usize,
-) -> Result<(), Refusal> {
-    let is_new = |cell: &Cell| known.get(*cell) == UNEXPLORED && erased.get(*cell) == UNEXPLORED;
-    let more = cells.filter(is_new).count();
-    match more > 0 && more + known.explored() + erased.explored() > most {
-        true => Err(Refusal::FullMap(most)),
-        false => Ok(()),
     }
 }
 

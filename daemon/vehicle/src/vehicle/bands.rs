@@ -11,6 +11,8 @@ use std::time::Duration;
 /// The bands, those of built-in layers included; others have the indexes above the built-in ones.
 #[derive(Debug, Default)]
 pub(super) struct Bands {
+    /// The codec of the layers that are added.
+    codec: Codec,
     set: LayerSet,
     bands: BTreeMap<LayerId, Band>,
 }
@@ -30,23 +32,23 @@ impl Band {
 }
 
 impl Bands {
+    /// Sets the codec of the layers that are added from now on.
+    pub(super) fn set_codec(&mut self, codec: Codec) {
+        self.codec = codec;
+    }
+
     /// Whether a layer is that of a band.
     pub(super) fn has(&self, id: LayerId) -> bool {
         self.bands.contains_key(&id)
     }
 
     /// The layer of a band, which the link has from then on, and whether it is new; `None` if the map has no further one.
-    pub(super) fn add(
-        &mut self,
-        descriptor: &LayerDescriptor,
-        codec: Codec,
-        link: &mut VehicleLink,
-    ) -> (Option<LayerId>, bool) {
+    pub(super) fn add(&mut self, descriptor: &LayerDescriptor, link: &mut VehicleLink) -> (Option<LayerId>, bool) {
         let id = match self.set.id(&descriptor.name) {
             Some(id) => id,
             None => {
                 let Some(id) = self.set.add(descriptor.clone()) else { return (None, false) };
-                link.add_layer(LayerSource::new(id, descriptor.clone(), codec, Duration::ZERO));
+                link.add_layer(LayerSource::new(id, descriptor.clone(), self.codec, Duration::ZERO));
                 id
             }
         };

@@ -2,8 +2,9 @@
 
 use crate::{LabelChanges, LastPlace};
 use scenecast_protocol::coordinates::DecimetrePoint;
-use scenecast_protocol::directive::Series;
-use scenecast_protocol::link::{Authenticity, SlotInboxState};
+use scenecast_protocol::directive::{Areas, Budget, Limits, Series, Utility};
+use scenecast_protocol::link::{Authenticity, SlotInboxState, VehicleConfig};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::seal::{HeldKey, VehicleKey};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -20,48 +21,27 @@ pub struct Durable {
     pub labels: u8,
     /// Random number of the mission, which its checkpoints carry too.
     pub lineage: u64,
-    /// Utility in force: epoch, exploration, curiosity, weights; in hundredths.
-    pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
-    /// The highest label when that utility was applied.
-    pub weighed: u8,
+    pub utility: KeptUtility,
     /// Whether the operator has ordered the vehicle to hold.
     pub hold: bool,
     /// Whether the operator has ordered the vehicle to abort.
     pub abort: bool,
-    /// Budget in force in bit/s, if it differs from the configuration.
-    pub budget_bps: Option<u32>,
-    /// Least shares in force in percent, if they differ from the configuration.
-    pub shares: Option<[u8; 5]>,
-    /// Order of the background streams as on the wire, if it differs from the configuration.
-    pub background: Option<Vec<u8>>,
+    pub budget: KeptBudget,
     /// Settings in force as on the wire. Empty: all as configured.
     pub settings: Vec<u8>,
-    /// Limits in force as on the wire. Empty: none.
-    pub limits: Vec<u8>,
-    /// Metres and seconds of the limits that are used up, at most 50 m and 60 s behind the truth.
-    pub used: (u32, u32),
-    /// The breach that the operator has not answered yet: the reason's number on the wire, or 0.
-    pub breach: u8,
+    pub limits: KeptLimits,
     /// Fence in force as on the wire. Empty: none.
     pub fence: Vec<u8>,
     /// Position at the last fix that was used.
     pub place: Option<LastPlace>,
     /// The orders that this state knows nothing of, because an earlier state was lost.
     pub lost: LostOrders,
-    /// Destination in force in the world frame: decimetres east and north.
-    pub destination: Option<(i32, i32)>,
-    /// Weighted areas in force as on the wire. Empty: none.
-    pub areas: Vec<u8>,
+    pub goals: KeptGoals,
     /// The keys that the surface has given.
     pub keys: KeptKeys,
 }
 
 impl Durable {
-    /// The destination in force, in the world frame.
-    pub fn destination(&self) -> Option<DecimetrePoint> {
-        self.destination.map(|(east_dm, north_dm)| DecimetrePoint::new(east_dm, north_dm))
-    }
-
     /// Claims the labels of a map; returns whether it has others than were claimed so far.
     pub(super) fn claim(&mut self, map: &LabelChanges) -> bool {
         let is_more = map.epoch != self.epoch || map.highest > self.labels;
@@ -69,6 +49,114 @@ impl Durable {
             (self.epoch, self.labels) = (map.epoch, map.highest);
         }
         is_more
+    }
+}
+
+// The fields of these parts follow each other in the stored bytes as if they stood in `Durable` itself.
+
+/// The utility in force.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct KeptUtility {
+    /// Epoch, exploration, curiosity, weights; in hundredths.
+    pub order: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
+    /// The highest label when it was applied.
+    pub weighed: u8,
+}
+
+impl KeptUtility {
+    pub(super) fn keep(&mut self, utility: &Utility, labels: u8) {
+        let Utility { epoch, exploration, curiosity, weights } = utility.clone();
+        *self = Self { order: Some((epoch, exploration, curiosity, weights)), weighed: labels };
+    }
+
+    pub(super) fn order(&self) -> Option<Utility> {
+        let (epoch, exploration, curiosity, weights) = self.order.clone()?;
+        Some(Utility { epoch, exploration, curiosity, weights })
+    }
+}
+
+/// The budget of the link in force, where it differs from the configuration.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct KeptBudget {
+    /// Bits a second.
+    pub bits_per_s: Option<u32>,
+    /// Least shares in percent.
+    pub shares: Option<[u8; 5]>,
+    /// Order of the background streams as on the wire.
+    pub background: Option<Vec<u8>>,
+}
+
+impl KeptBudget {
+    pub(super) fn keep(&mut self, budget: &Budget) {
+        self.bits_per_s = Some(budget.bits_per_s);
+        self.shares = Some(budget.shares.0);
+        self.background = Some(budget.background.to_bytes());
+    }
+
+    /// Puts rate and shares in the place of the configured ones.
+    pub(crate) fn configure(&self, link: &mut VehicleConfig) {
+        link.budget_bps = self.bits_per_s.unwrap_or(link.budget_bps);
+        link.shares = self.shares.map_or(link.shares, Shares);
+    }
+
+    pub(crate) fn background(&self) -> Option<BackgroundOrder> {
+        self.background.as_deref().and_then(BackgroundOrder::from_bytes)
+    }
+}
+
+/// The limits in force, and their use.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct KeptLimits {
+    /// The limits as on the wire. Empty: none.
+    pub order: Vec<u8>,
+    /// Metres and seconds of the limits that are used up, at most 50 m and 60 s behind the truth.
+    pub used: (u32, u32),
+    /// The breach that the operator has not answered yet: the reason's number on the wire, or 0.
+    pub breach: u8,
+}
+
+impl KeptLimits {
+    /// Keeps limits that begin to count now.
+    pub(super) fn keep(&mut self, limits: &Limits) {
+        (self.order, self.used) = (limits.to_bytes(), (0, 0));
+    }
+
+    pub(super) fn order(&self) -> Option<Limits> {
+        Limits::from_bytes(&self.order)
+    }
+
+    /// Metres and seconds that are used up.
+    pub(super) fn used(&self) -> (f64, f64) {
+        (f64::from(self.used.0), f64::from(self.used.1))
+    }
+}
+
+/// The places of the map that the operator has chosen.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct KeptGoals {
+    /// Destination in force in the world frame: decimetres east and north.
+    pub destination: Option<(i32, i32)>,
+    /// Weighted areas in force as on the wire. Empty: none.
+    pub areas: Vec<u8>,
+}
+
+impl KeptGoals {
+    /// The destination in force, in the world frame.
+    pub(super) fn destination(&self) -> Option<DecimetrePoint> {
+        self.destination.map(|(east_dm, north_dm)| DecimetrePoint::new(east_dm, north_dm))
+    }
+
+    pub(super) fn keep_destination(&mut self, place: Option<DecimetrePoint>) {
+        self.destination = place.map(|place| (place.east_dm, place.north_dm));
+    }
+
+    /// The weighted areas in force; `None` if there are none.
+    pub(super) fn areas(&self) -> Option<Areas> {
+        Areas::from_bytes(&self.areas).filter(|areas| areas.check().is_ok())
+    }
+
+    pub(super) fn keep_areas(&mut self, areas: &Areas) {
+        self.areas = if areas.0.is_empty() { Vec::new() } else { areas.to_bytes() };
     }
 }
 

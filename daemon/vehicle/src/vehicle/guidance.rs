@@ -99,21 +99,21 @@ impl Guidance {
         let mut guidance = Self { steering, failsafe, activity, leg: None, path, is_finished: false };
         let failsafe = &mut guidance.failsafe;
         failsafe.order = Constraints { hold: durable.hold, abort: durable.abort };
-        if let Some(limits) = Limits::from_bytes(&durable.limits) {
+        if let Some(limits) = durable.limits.order() {
             failsafe.set_limits(limits);
-            (failsafe.used_m, failsafe.used_s) = (f64::from(durable.used.0), f64::from(durable.used.1));
+            (failsafe.used_m, failsafe.used_s) = durable.limits.used();
         }
-        if let Some(reason) = ModeReason::from_code(durable.breach) {
+        if let Some(reason) = ModeReason::from_code(durable.limits.breach) {
             failsafe.handle_breach(reason);
         }
         guidance.steering.set_choices(settings.planner.value(), settings.at_end.value());
         if let Some(fence) = Fence::from_bytes(&durable.fence).filter(|f| f.check().is_ok()) {
             guidance.steering.set_fence(&fence);
         }
-        if let Some(areas) = Areas::from_bytes(&durable.areas).filter(|areas| areas.check().is_ok()) {
+        if let Some(areas) = durable.goals.areas() {
             guidance.steering.set_areas(areas);
         }
-        guidance.steering.set_destination(durable.destination());
+        guidance.steering.set_destination(durable.goals.destination());
         guidance
     }
 

@@ -14,7 +14,7 @@ mod report;
 mod slots;
 mod storing;
 
-pub use durable::{Durable, KeptKeys, LostOrders};
+pub use durable::{Durable, KeptBudget, KeptGoals, KeptKeys, KeptLimits, KeptUtility, LostOrders};
 pub use evidence::{Evidence, MappedFrame};
 pub use storing::VehicleDisk;
 
@@ -30,8 +30,9 @@ use gallery::Gallery;
 use guidance::{Guidance, Situation};
 use publisher::MapPublisher;
 pub use publisher::MapSelection;
+use report::EquipmentState;
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState, Utility};
+use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState};
 use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::ClassEntry;
 use scenecast_protocol::map_codec::Codec;
@@ -90,10 +91,7 @@ pub struct Vehicle {
     has_new_orders: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
-    autopilot_silent: bool,
-    faults: EquipmentFaults,
-    /// The codec of layers that are added.
-    codec: Codec,
+    equipment: EquipmentState,
 }
 
 impl Vehicle {
@@ -106,12 +104,6 @@ impl Vehicle {
         durable: Durable,
         now: Instant,
     ) -> Self {
-        let utility = durable.utility.clone().map(|(epoch, exploration, curiosity, weights)| Utility {
-            epoch,
-            exploration,
-            curiosity,
-            weights,
-        });
         let settings = Settings::from_bytes(&durable.settings).unwrap_or_default();
         let mut vehicle = Self {
             link,
@@ -123,18 +115,19 @@ impl Vehicle {
             gallery: Gallery::default(),
             floor: FloorPictures::default(),
             // The weights are those of labels of their epoch; a new epoch has no labels yet.
-            weights: Weights::new(utility.filter(|u| u.epoch == durable.epoch), durable.weighed),
+            weights: Weights::new(
+                durable.utility.order().filter(|u| u.epoch == durable.epoch),
+                durable.utility.weighed,
+            ),
             storing: Storing::new(durable.epoch, durable.labels),
             durable,
             settings,
             has_new_orders: false,
             outputs: VecDeque::new(),
             fixes_applied: 0,
-            autopilot_silent: false,
-            faults: EquipmentFaults::default(),
-            codec: Codec::Auto,
+            equipment: EquipmentState::default(),
         };
-        if vehicle.weights.ordered().is_none() && vehicle.durable.utility.take().is_some() {
+        if vehicle.weights.ordered().is_none() && vehicle.durable.utility.order.take().is_some() {
             let other = SlotState::Refused(RefusalReason::OtherEpoch);
             vehicle.link.decide(SlotId::Utility, other, now);
             vehicle.durable.inbox = vehicle.link.persistent_state().clone();
@@ -155,7 +148,7 @@ impl Vehicle {
 
     /// Sets the codec of the layers of bands.
     pub fn set_codec(&mut self, codec: Codec) {
-        self.codec = codec;
+        self.publisher.set_codec(codec);
     }
 
     /// Sets the clock of this computer, with which that of the surface is compared.
@@ -176,12 +169,12 @@ impl Vehicle {
 
     /// Sets whether the autopilot does not answer; the next status reports it.
     pub fn set_autopilot_silent(&mut self, is_silent: bool) {
-        self.autopilot_silent = is_silent;
+        self.equipment.is_autopilot_silent = is_silent;
     }
 
     /// Sets the faults of the equipment; the next status reports them.
     pub fn set_faults(&mut self, faults: EquipmentFaults) {
-        self.faults = faults;
+        self.equipment.faults = faults;
     }
 
     /// Sets the state of the disk; the next status reports it.
@@ -253,7 +246,7 @@ impl Vehicle {
     }
 
     fn publish(&mut self, changes: &MapChanges, now: Instant) {
-        self.publisher.handle_changes(changes, self.storing.labels(), self.codec, &mut self.link, now);
+        self.publisher.handle_changes(changes, self.storing.labels(), &mut self.link, now);
         let Some(labels) = &changes.labels else { return };
         if labels.tree.as_ref().is_some_and(|tree| self.weights.handle_tree(tree, labels.highest)) {
             self.guidance.replan();
@@ -364,8 +357,8 @@ impl Vehicle {
 
     /// A destination is in force no longer once it is reached.
     fn follow_destination(&mut self, now: Instant) {
-        if self.durable.destination.is_some() && !self.guidance.has_destination() {
-            self.durable.destination = None;
+        if self.durable.goals.destination.is_some() && !self.guidance.has_destination() {
+            self.durable.goals.destination = None;
             self.report_in_force(now);
             self.has_new_orders = true;
             self.outputs.push_back(VehicleOutput::Persist);
@@ -374,13 +367,13 @@ impl Vehicle {
 
     /// Stores the use of the limits and the breach when they have changed enough.
     fn record(&mut self) {
-        let (noted_m, noted_s) = (f64::from(self.durable.used.0), f64::from(self.durable.used.1));
+        let (noted_m, noted_s) = self.durable.limits.used();
         let (used_m, used_s) = self.guidance.used();
         let is_far = used_m - noted_m > RECORD_INTERVAL.0 || used_s - noted_s > RECORD_INTERVAL.1;
         let breach = self.guidance.breach();
-        if (is_far && self.guidance.is_limited()) || breach != self.durable.breach {
-            self.durable.used = (used_m as u32, used_s as u32);
-            self.durable.breach = breach;
+        if (is_far && self.guidance.is_limited()) || breach != self.durable.limits.breach {
+            self.durable.limits.used = (used_m as u32, used_s as u32);
+            self.durable.limits.breach = breach;
             self.outputs.push_back(VehicleOutput::Persist);
         }
     }

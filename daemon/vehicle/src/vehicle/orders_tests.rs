@@ -274,7 +274,7 @@ fn a_breach_is_reported_until_the_operator_answers() {
     sea.vehicle.navigator.set_pose(25.0, 5.0, 0.0, 16.0, sea.now);
     until_it_persists(&mut sea);
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Return, ModeReason::Fence));
-    assert_eq!(sea.vehicle.durable().breach, 2);
+    assert_eq!(sea.vehicle.durable().limits.breach, 2);
     (0..200).for_each(|_| sea.step());
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Hold, ModeReason::Fence), "back at the return point");
     sea.order(Slot::Constraints(Constraints::default()));
@@ -406,7 +406,7 @@ fn a_destination_is_reached_and_then_no_longer_in_force() {
     assert_eq!(sea.vehicle.link.in_force(SlotId::Destination), Some(&order));
     (0..20).for_each(|_| sea.step());
     assert_eq!(sea.vehicle.guidance.intent(), Some(Intent::Destination));
-    assert_eq!(sea.vehicle.durable().destination(), Some(place));
+    assert_eq!(sea.vehicle.durable().goals.destination(), Some(place));
     let away_m = |sea: &Sea| {
         let navigator = sea.vehicle.navigator();
         navigator.to_world(navigator.position()).distance_m(place.to_world())
@@ -417,7 +417,10 @@ fn a_destination_is_reached_and_then_no_longer_in_force() {
         least_m = least_m.min(away_m(&sea));
     }
     assert!(least_m < 0.6, "{least_m} m");
-    assert_eq!((sea.vehicle.durable().destination(), sea.vehicle.link.in_force(SlotId::Destination)), (None, None));
+    assert_eq!(
+        (sea.vehicle.durable().goals.destination(), sea.vehicle.link.in_force(SlotId::Destination)),
+        (None, None)
+    );
     assert_eq!(sea.vehicle.mode().0, VehicleMode::Survey);
     assert!(away_m(&sea) > 1.0, "the survey is resumed");
     let corners = [(-900, -900), (900, -900), (900, 900), (-900, 900)].map(|(x, y)| DecimetrePoint::new(x, y));

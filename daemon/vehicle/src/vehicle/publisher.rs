@@ -91,6 +91,11 @@ impl MapPublisher {
         self.explored
     }
 
+    /// Sets the codec of the layers of bands.
+    pub(super) fn set_codec(&mut self, codec: Codec) {
+        self.bands.set_codec(codec);
+    }
+
     /// Sets the configured selection, which orders override.
     pub(super) fn configure(&mut self, selection: MapSelection) {
         self.configured = selection;
@@ -136,14 +141,7 @@ impl MapPublisher {
 
     /// Takes changes of a producer and gives the link those cells whose labels are on the disk, which are labels up to `stored`.
     /// The others wait for [`Self::handle_stored`].
-    pub(super) fn handle_changes(
-        &mut self,
-        changes: &MapChanges,
-        stored: u8,
-        codec: Codec,
-        link: &mut VehicleLink,
-        now: Instant,
-    ) {
+    pub(super) fn handle_changes(&mut self, changes: &MapChanges, stored: u8, link: &mut VehicleLink, now: Instant) {
         if let Some(frame) = &changes.frame {
             self.frames.handle(frame, now);
             self.evidence.handle_frame(frame, self.frames);
@@ -158,7 +156,7 @@ impl MapPublisher {
                 self.set_levels(id, levels.iter().copied(), link, now);
             }
         }
-        self.handle_bands(changes, codec, link, now);
+        self.handle_bands(changes, link, now);
     }
 
     fn handle_labels(&mut self, changes: &LabelChanges, stored: u8, link: &mut VehicleLink, now: Instant) {
@@ -207,9 +205,9 @@ impl MapPublisher {
         }
     }
 
-    fn handle_bands(&mut self, changes: &MapChanges, codec: Codec, link: &mut VehicleLink, now: Instant) {
+    fn handle_bands(&mut self, changes: &MapChanges, link: &mut VehicleLink, now: Instant) {
         for (descriptor, levels) in &changes.bands {
-            let (Some(id), is_new) = self.bands.add(descriptor, codec, link) else { continue };
+            let (Some(id), is_new) = self.bands.add(descriptor, link) else { continue };
             if is_new {
                 self.select(link);
             }

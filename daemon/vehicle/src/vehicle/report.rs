@@ -7,7 +7,14 @@ use scenecast_protocol::directive::{Settings, Utility};
 use scenecast_protocol::link::LinkStats;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerSource};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{ModeReason, PlannedPath, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{EquipmentFaults, ModeReason, PlannedPath, VehicleMode, VehicleStatus};
+
+/// The state of the vehicle's equipment, as the next status reports it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct EquipmentState {
+    pub(super) is_autopilot_silent: bool,
+    pub(super) faults: EquipmentFaults,
+}
 
 impl Vehicle {
     /// The state that the host stores at [`super::VehicleOutput::Persist`].
@@ -107,7 +114,7 @@ impl Vehicle {
         VehicleStatus {
             mode,
             reason,
-            autopilot_silent: self.autopilot_silent,
+            autopilot_silent: self.equipment.is_autopilot_silent,
             position: self.navigator.position(),
             depth_m: self.navigator.depth_m(),
             heading_deg: self.navigator.heading_rad().to_degrees().rem_euclid(360.0),
@@ -117,7 +124,7 @@ impl Vehicle {
             path: self.guidance.path().clone(),
             intent: self.guidance.intent(),
             registration: self.registration.report(),
-            faults: self.faults,
+            faults: self.equipment.faults,
             trail: self.track.corners(self.navigator.position(), now),
             epoch: self.storing.epoch(),
             labels: self.publisher.labels(),

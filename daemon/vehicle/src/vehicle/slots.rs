@@ -95,15 +95,15 @@ impl Vehicle {
 
     /// Has the link report the content in force of each slot. The link reports its budget by itself.
     pub(super) fn report_in_force(&mut self, now: Instant) {
-        let limits = Limits::from_bytes(&self.durable.limits).map(Slot::Limits);
+        let limits = self.durable.limits.order().map(Slot::Limits);
         let fence = Fence::from_bytes(&self.durable.fence).filter(|fence| fence.check().is_ok()).map(Slot::Fence);
         self.link.set_in_force(SlotId::Utility, self.weights.ordered().cloned().map(Slot::Utility), now);
         self.link.set_in_force(SlotId::Settings, Some(Slot::Settings(self.settings)), now);
         self.link.set_in_force(SlotId::Limits, limits, now);
         self.link.set_in_force(SlotId::Fence, fence, now);
-        let areas = Areas::from_bytes(&self.durable.areas).filter(|areas| areas.check().is_ok()).map(Slot::Areas);
+        let areas = self.durable.goals.areas().map(Slot::Areas);
         self.link.set_in_force(SlotId::Areas, areas, now);
-        let destination = Destination { place: self.durable.destination() };
+        let destination = Destination { place: self.durable.goals.destination() };
         self.link.set_in_force(SlotId::Destination, Some(Slot::Destination(destination)), now);
     }
 
@@ -161,7 +161,7 @@ impl Vehicle {
 
     fn apply_constraints(&mut self, order: Constraints) {
         (self.durable.hold, self.durable.abort) = (order.hold, order.abort);
-        self.durable.breach = 0;
+        self.durable.limits.breach = 0;
         self.guidance.set_constraints(order);
     }
 
@@ -173,8 +173,7 @@ impl Vehicle {
         if !self.guidance.is_able(&limits, self.navigator.depth_m()) {
             return Err(RefusalReason::Unable);
         }
-        self.durable.limits = limits.to_bytes();
-        self.durable.used = (0, 0);
+        self.durable.limits.keep(&limits);
         self.guidance.set_limits(limits);
         Ok(())
     }
@@ -189,7 +188,7 @@ impl Vehicle {
             return Err(RefusalReason::Outside);
         }
         self.durable.fence = fence.to_bytes();
-        self.durable.breach = 0;
+        self.durable.limits.breach = 0;
         self.guidance.set_fence(fence);
         Ok(())
     }
@@ -199,7 +198,7 @@ impl Vehicle {
         if place.is_some_and(|place| !self.guidance.can_reach(&self.navigator, place)) {
             return Err(RefusalReason::Contradiction);
         }
-        self.durable.destination = place.map(|place| (place.east_dm, place.north_dm));
+        self.durable.goals.keep_destination(place);
         self.guidance.set_destination(place);
         Ok(())
     }
@@ -209,7 +208,7 @@ impl Vehicle {
             AreasFault::Weight(..) => RefusalReason::OutOfRange,
             _ => RefusalReason::Contradiction,
         })?;
-        self.durable.areas = if areas.0.is_empty() { Vec::new() } else { areas.to_bytes() };
+        self.durable.goals.keep_areas(&areas);
         self.guidance.set_areas(areas);
         Ok(())
     }
@@ -224,10 +223,9 @@ impl Vehicle {
         if utility.weights.keys().any(|&label| label > self.publisher.labels()) {
             return Err(RefusalReason::UnknownLabel);
         }
-        let u = &utility;
-        self.durable.utility = Some((u.epoch, u.exploration, u.curiosity, u.weights.clone()));
-        self.durable.weighed = self.publisher.labels();
-        self.weights = Weights::new(Some(utility), self.durable.weighed);
+        let labels = self.publisher.labels();
+        self.durable.utility.keep(&utility, labels);
+        self.weights = Weights::new(Some(utility), labels);
         self.guidance.replan();
         self.follow_utility();
         Ok(())
@@ -271,9 +269,7 @@ impl Vehicle {
             self.publisher.publish(&mut self.link, now);
         }
         self.serve_exemplars(now);
-        self.durable.budget_bps = Some(budget.bits_per_s);
-        self.durable.shares = Some(budget.shares.0);
-        self.durable.background = Some(budget.background.to_bytes());
+        self.durable.budget.keep(&budget);
     }
 }
 

@@ -303,7 +303,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let Some(peer) = self.fleet.get_mut(sent.to) else { return };
         peer.handle_sent(sent.number, now);
         if sent.last {
-            let losable = peer.stats().loss_in.copies(0.03, 8) - 1;
+            let losable = peer.stats().incoming.loss.copies(0.03, 8) - 1;
             peer.master.handle_turn_sent(&self.config.modem, losable, now);
             self.cycle.handle_turn_sent();
         }

@@ -74,7 +74,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             false if peer.is_proof_due() => FramePurpose::Proof,
             false => FramePurpose::Content,
         };
-        let copies = if is_plentiful { peer.stats().loss_out.copies(TURN_LOSS_RISK, 6) } else { 1 };
+        let copies = if is_plentiful { peer.stats().outgoing.loss.copies(TURN_LOSS_RISK, 6) } else { 1 };
         let mut plan = peer.plan_turn(&modem, purpose, copies, &self.shares, now);
         let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem, purpose), now)));
         if affordable == 0 {

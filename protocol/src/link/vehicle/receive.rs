@@ -110,7 +110,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.pair.stats.drop(DropReason::Malformed);
         }
         self.handle_fates(fates, now);
-        self.content.objects.set_loss(self.pair.stats.loss_out.expected());
+        self.content.objects.set_loss(self.pair.stats.outgoing.loss.expected());
         for (slot, number) in slots.iter().zip(number.into_iter().cycle()) {
             self.handle_slot(slot, number, bytes.len(), now);
         }

@@ -172,7 +172,7 @@ impl<S: StateSource> VehicleLink<S> {
             // So many frames were lost that the acknowledgements would fall ever further behind.
             return size / 2;
         }
-        let loss = self.pair.stats.loss_out;
+        let loss = self.pair.stats.outgoing.loss;
         let is_scarce = !self.config.modem.access.is_free() && self.is_budget_bound(now);
         let first = match is_scarce {
             // The last new frame is one of them, with no bytes, whenever the turn proves to end.
@@ -194,7 +194,7 @@ impl<S: StateSource> VehicleLink<S> {
         RepeatTerms {
             modem: self.config.modem,
             outstanding: self.pair.outstanding(),
-            loss: self.pair.stats.loss_out.expected(),
+            loss: self.pair.stats.outgoing.loss.expected(),
             is_budget_bound: self.is_budget_bound(now),
             handover: self.handover(),
         }
@@ -249,7 +249,7 @@ impl<S: StateSource> VehicleLink<S> {
         let mut carried = Carried::new();
         if !sends_hello {
             if modem.access == Access::FullDuplex {
-                let loss = self.pair.stats.loss_out;
+                let loss = self.pair.stats.outgoing.loss;
                 let copies =
                     if loss.expected() <= NO_LOSS { 1 } else { loss.copies(STATUS_LOSS_RISK, MAX_STATUS_COPIES) };
                 self.content.status.set_copies(copies, self.budget.bits_per_s());

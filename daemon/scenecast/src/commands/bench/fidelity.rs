@@ -88,8 +88,8 @@ fn print_row(r: &FidelityRow) {
         number(r.operator_share),
         number(r.operator_share_mean),
         r.agreement_mean,
-        r.age_s_median,
-        r.age_s_p95,
+        r.age.age_s_median,
+        r.age.age_s_p95,
         r.uplink_bytes.all(),
         r.uplink_bytes.map,
         r.map_share,
@@ -97,7 +97,7 @@ fn print_row(r: &FidelityRow) {
         number(r.end.error_rigid_cells),
         r.repeats.frames,
         r.repeats.arrived_twice,
-        r.energy_j.map_or("-".to_owned(), |j| format!("{j:.0}")),
-        r.energy_per_map_bit_j.map_or("-".to_owned(), |j| format!("{:.2}", j * 1e3)),
+        r.energy.energy_j.map_or("-".to_owned(), |j| format!("{j:.0}")),
+        r.energy.energy_per_map_bit_j.map_or("-".to_owned(), |j| format!("{:.2}", j * 1e3)),
     );
 }

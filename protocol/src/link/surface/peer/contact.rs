@@ -1,6 +1,7 @@
 //! When a vehicle was last in contact, its clock, and when it must be contacted without a turn.
 
 use crate::link::FrameNumber;
+use crate::mac::{Access, ModemProfile};
 use crate::time::{ClockMap, Instant};
 use crate::wire::Stamp;
 use std::collections::VecDeque;
@@ -16,6 +17,48 @@ const PROMPT_HELLOS: u32 = 5;
 const ROLL_CALL: Duration = Duration::from_secs(300);
 /// Transmissions of an order without any frame of the vehicle after which it is sent a hello.
 const UNACKNOWLEDGED_ORDERS: u32 = 2;
+
+/// How long an acknowledgement waits for further frames, over a modem that does half duplex by itself.
+const USUAL_ANSWER_WAIT: Duration = Duration::from_secs(2);
+/// Over a medium that carries both directions at once, the time beside two round trips after which a slot goes out again.
+const FULL_DUPLEX_REPEAT: Duration = Duration::from_millis(400);
+/// There, the time in which a run is proven, longer than a vehicle takes hellos for copies of one.
+const FULL_DUPLEX_PROOF: Duration = Duration::from_millis(1600);
+
+/// The times in which answers follow, by the modem.
+#[derive(Debug)]
+pub(super) struct AnswerPace {
+    /// Whether both directions are on the air at once, so that answers are prompt.
+    pub(super) is_full_duplex: bool,
+    /// How long an acknowledgement waits for further frames, without turns.
+    pub(super) answer_wait: Duration,
+}
+
+impl Default for AnswerPace {
+    fn default() -> Self {
+        Self { is_full_duplex: false, answer_wait: USUAL_ANSWER_WAIT }
+    }
+}
+
+impl AnswerPace {
+    pub(super) fn of(modem: &ModemProfile) -> Self {
+        let is_full_duplex = modem.access == Access::FullDuplex;
+        Self { is_full_duplex, answer_wait: modem.answer_wait(USUAL_ANSWER_WAIT) }
+    }
+
+    /// Time in which a vehicle that was met proves the run.
+    pub(super) fn proof_timeout(&self) -> Duration {
+        if self.is_full_duplex { FULL_DUPLEX_PROOF } else { Contact::PROOF_TIMEOUT }
+    }
+
+    /// Time after which a slot that was not acknowledged goes out again.
+    pub(super) fn slot_timeout(&self, round_trip: Option<Duration>) -> Duration {
+        match self.is_full_duplex {
+            true => round_trip.unwrap_or(Duration::from_millis(300)) * 2 + FULL_DUPLEX_REPEAT,
+            false => round_trip.unwrap_or(Duration::from_secs(4)) * 2 + Duration::from_secs(4),
+        }
+    }
+}
 
 /// When the vehicle was last in contact, and when it must be contacted without a turn.
 #[derive(Debug)]

@@ -21,14 +21,14 @@ use crate::directive::{
 };
 use crate::link::handshake::FramePurpose;
 use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, Mismatch, SurfaceEvent};
-use crate::mac::{Access, Master, MasterConfig, ModemProfile, Wish};
+use crate::mac::{Master, MasterConfig, ModemProfile, Wish};
 use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
 use crate::wire::{
     Address, Chunk, ChunkKind, Envelope, Header, Introduction, MissionId, Stamp, UtcHours, VehicleStatus,
 };
-use contact::{Contact, VehicleTiming};
+use contact::{AnswerPace, Contact, VehicleTiming};
 use content::{ChunkOutcome, Divergence, PeerContent, class_of};
 use in_force::InForceCopy;
 use std::collections::VecDeque;
@@ -56,9 +56,6 @@ const STRAYS_TIMEOUT: Duration = Duration::from_secs(20);
 const ANSWER_LOSS_RISK: f64 = 0.5;
 const MAX_ANSWERS: u32 = 6;
 
-/// How long an acknowledgement waits for further frames, over a modem that does half duplex by itself.
-const USUAL_ANSWER_WAIT: Duration = Duration::from_secs(2);
-
 /// A vehicle as the surface knows it.
 #[derive(Debug)]
 pub(super) struct VehiclePeer<R> {
@@ -79,10 +76,7 @@ pub(super) struct VehiclePeer<R> {
     key_offers: KeyOffers,
     /// The two ends were found to differ: a new run must begin.
     is_out_of_step: bool,
-    /// Whether both directions are on the air at once, so that answers are prompt.
-    is_full_duplex: bool,
-    /// How long an acknowledgement waits for further frames, without turns.
-    answer_wait: Duration,
+    pace: AnswerPace,
 }
 
 impl<R: StateReplica> VehiclePeer<R> {
@@ -110,18 +104,16 @@ impl<R: StateReplica> VehiclePeer<R> {
             takes_over_to_stop: false,
             key_offers: KeyOffers::new(now),
             is_out_of_step: false,
-            is_full_duplex: false,
-            answer_wait: USUAL_ANSWER_WAIT,
+            pace: AnswerPace::default(),
         }
     }
 
     /// Takes the pace of answers from the modem.
     pub(super) fn with_modem(mut self, modem: &ModemProfile) -> Self {
-        self.is_full_duplex = modem.access == Access::FullDuplex;
-        if self.is_full_duplex {
+        self.pace = AnswerPace::of(modem);
+        if self.pace.is_full_duplex {
             self.contact.expect_prompt_answers();
         }
-        self.answer_wait = modem.answer_wait(USUAL_ANSWER_WAIT);
         self
     }
 
@@ -493,10 +485,10 @@ impl<R: StateReplica> VehiclePeer<R> {
     /// Makes an acknowledgement due, if one is owed.
     pub(super) fn owe_answer(&mut self, now: Instant) {
         let is_proven = self.pair.is_proven();
-        let wait = if is_proven { self.answer_wait } else { Duration::ZERO };
+        let wait = if is_proven { self.pace.answer_wait } else { Duration::ZERO };
         if self.pair.unstated() > 0 || (self.pair.has_run() && !is_proven) {
             if self.contact.answer_due.is_none() {
-                self.contact.answers_left = self.pair.stats.loss_out.copies(ANSWER_LOSS_RISK, MAX_ANSWERS);
+                self.contact.answers_left = self.pair.stats.outgoing.loss.copies(ANSWER_LOSS_RISK, MAX_ANSWERS);
             }
             self.contact.answer_due.get_or_insert(now + wait);
         }

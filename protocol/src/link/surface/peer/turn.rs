@@ -1,7 +1,6 @@
 //! Frames to a vehicle: those of a turn, with the offer of its next key, and those without one, through a modem that does half
 //! duplex by itself.
 
-use super::contact::Contact;
 use super::{Carried, InForceCopy, LastTurn, VehiclePeer};
 use crate::directive::PendingSlot;
 use crate::link::handshake::FramePurpose;
@@ -251,10 +250,6 @@ impl KeyOffers {
 
 /// Frame numbers since the last acknowledgement after which the next one does not wait any longer.
 const MAX_UNACKNOWLEDGED: u64 = 16;
-/// Over a medium that carries both directions at once, the time beside two round trips after which a slot goes out again.
-const FULL_DUPLEX_REPEAT: Duration = Duration::from_millis(400);
-/// There, the time in which a run is proven, longer than a vehicle takes hellos for copies of one.
-const FULL_DUPLEX_PROOF: Duration = Duration::from_millis(1600);
 
 impl<R: StateReplica> VehiclePeer<R> {
     fn must_send_hello(&self, now: Instant) -> bool {
@@ -264,7 +259,7 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// When a run that the vehicle has offered is to be proven, unless a frame of the current run comes in before.
     fn proof_due(&self) -> Option<Instant> {
-        let timeout = self.slot_timeout().max(self.proof_timeout());
+        let timeout = self.slot_timeout().max(self.pace.proof_timeout());
         // A vehicle that repeats its hello has not received the last proof; a forged offer is silent.
         let pause = timeout * if self.pair.owes_proof() { 1 } else { 1 << (self.pair.proofs().clamp(1, 3) - 1) };
         let again = self.contact.proved.map_or(Instant::ZERO, |at| at + pause);
@@ -360,21 +355,13 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.contact.answer_due = (must_prove || is_partial).then_some(next);
         self.contact.acknowledged = self.pair.highest();
         if purpose.is_hello() {
-            self.contact.note_hello(timeout.max(self.proof_timeout()), self.pair.stats.dropped_total(), now);
+            self.contact.note_hello(timeout.max(self.pace.proof_timeout()), self.pair.stats.dropped_total(), now);
         }
         Some(ready)
     }
 
-    /// Time in which a vehicle that was met proves the run.
-    fn proof_timeout(&self) -> Duration {
-        if self.is_full_duplex { FULL_DUPLEX_PROOF } else { Contact::PROOF_TIMEOUT }
-    }
-
     /// Time after which a slot that was not acknowledged goes out again.
     pub(super) fn slot_timeout(&self) -> Duration {
-        match self.is_full_duplex {
-            true => self.master.round_trip().unwrap_or(Duration::from_millis(300)) * 2 + FULL_DUPLEX_REPEAT,
-            false => self.master.round_trip().unwrap_or(Duration::from_secs(4)) * 2 + Duration::from_secs(4),
-        }
+        self.pace.slot_timeout(self.master.round_trip())
     }
 }
