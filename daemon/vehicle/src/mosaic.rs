@@ -324,8 +324,8 @@ mod tests {
     #[test]
     fn tiles_and_views_are_bounded() {
         let mut mosaic = Mosaic::default();
-        for n in 0..700 {
-            add(&mut mosaic, pose(2.0 * f64::from(n) + 1.0, 1.0, 0.0), f64::from(n));
+        for n in 0..200 {
+            add(&mut mosaic, pose(4.0 * f64::from(n), 2.0, 0.0), f64::from(n));
             mosaic.poll_settled(CELL_M, f64::from(n));
         }
         assert_eq!(mosaic.tiles.len(), MAX_TILES);

@@ -45,6 +45,7 @@ struct Tile {
 struct InFlight {
     at: TilePlace,
     serial: u64,
+    size: u8,
     object: ObjectId,
 }
 
@@ -107,7 +108,7 @@ impl FloorPictures {
                 (tile.kept, tile.sizes) = (Kept::Sent(view.clone()), WHOLE + 1);
             }
             let Some(object) = link.push_last_object(view.encode()) else { continue };
-            self.in_flight.push(InFlight { at, serial: tile.serial, object });
+            self.in_flight.push(InFlight { at, serial: tile.serial, size: view.size, object });
         }
     }
 
@@ -141,10 +142,10 @@ impl FloorPictures {
 
     /// Stops what is in flight; it is sent again later.
     fn withdraw(&mut self, link: &mut VehicleLink) {
-        for InFlight { at, serial, object } in std::mem::take(&mut self.in_flight) {
+        for InFlight { at, serial, size, object } in std::mem::take(&mut self.in_flight) {
             link.cancel_object(object);
             if let Some(tile) = self.tiles.get_mut(&at).filter(|tile| tile.serial == serial) {
-                tile.sizes = 0;
+                tile.sizes = tile.sizes.min(size);
             }
         }
     }
@@ -164,4 +165,82 @@ fn coded(tile: &FloorTile, size: u8, frames: &FrameClock, now: Instant) -> Optio
     let bytes = compress_to(picture, GOOD_SSIM, max_bytes(size))?.bytes;
     let view = ExemplarView::new(tile.width_m, tile.middle_m, frames.taken(tile.t_s), now);
     (view.width_mm > 0).then_some(FloorView { size, view, bytes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link_config;
+    use image::Rgb;
+    use scenecast_config::{Config, modem_profile};
+    use scenecast_protocol::schedule::BackgroundOrder;
+
+    fn link() -> VehicleLink {
+        let config = Config::default();
+        let profile = modem_profile(&config, config.modem.bit_rate);
+        let link = link_config(&config, None, profile).unwrap();
+        VehicleLink::new(link, config.map.codec, 1, Default::default(), Instant::ZERO)
+    }
+
+    fn tile(column: i32) -> FloorTile {
+        let picture = RgbImage::from_fn(128, 128, |x, y| Rgb([(x * 2) as u8, (y * 2) as u8, column as u8]));
+        let middle_m = (2.0 * f64::from(column) + 1.0, 1.0);
+        FloorTile { at: (column, 0), picture: picture.into(), middle_m, width_m: 2.0, t_s: 0.0 }
+    }
+
+    /// Column and size class of what is sent; the surface has each object at once.
+    fn sent(floor: &mut FloorPictures, link: &mut VehicleLink) -> Vec<(i32, u8)> {
+        let mut sent = Vec::new();
+        loop {
+            floor.serve(|(column, _)| f64::from(column), &FrameClock::default(), link, Instant::ZERO);
+            if floor.in_flight.is_empty() {
+                return sent;
+            }
+            for InFlight { at, size, object, .. } in std::mem::take(&mut floor.in_flight) {
+                sent.push((at.0, size));
+                link.cancel_object(object);
+            }
+        }
+    }
+
+    #[test]
+    fn every_tile_is_sent_small_before_any_is_sent_whole() {
+        let (mut floor, mut link) = (FloorPictures::default(), link());
+        floor.add(&[tile(3), tile(1), tile(2)]);
+        assert_eq!(sent(&mut floor, &mut link), [(3, 0), (1, 0), (2, 0), (3, 1), (2, 1), (1, 1)], "then by weight");
+        floor.add(&[tile(1)]);
+        assert_eq!(sent(&mut floor, &mut link), [(1, 0), (1, 1)], "more of it was seen");
+    }
+
+    #[test]
+    fn what_was_in_flight_is_sent_again_after_a_restart_of_the_link() {
+        let (mut floor, mut link) = (FloorPictures::default(), link());
+        floor.add(&[tile(1)]);
+        floor.serve(|_| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        let object = floor.in_flight[0].object;
+        floor.handle_restart(&mut link);
+        assert_eq!(sent(&mut floor, &mut link), [(1, 1)], "it was on its way whole");
+        floor.handle_delivered(object);
+        floor.tiles.values_mut().for_each(|tile| tile.sizes = 0);
+        assert_eq!(sent(&mut floor, &mut link), [(1, 1)], "another surface gets it whole at once");
+    }
+
+    #[test]
+    fn no_more_is_in_flight_than_the_link_takes_and_nothing_unless_it_is_listed() {
+        let (mut floor, mut link) = (FloorPictures::default(), link());
+        floor.add(&(0..40).map(tile).collect::<Vec<_>>());
+        floor.serve(|_| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        assert!((1..=MAX_IN_FLIGHT).contains(&floor.in_flight.len()));
+        link.set_background(BackgroundOrder::new(&[BackgroundStream::Exemplars]).unwrap());
+        floor.serve(|_| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        assert_eq!((floor.in_flight.len(), link.background_object_bytes()), (0, 0));
+    }
+
+    #[test]
+    fn the_newest_tiles_are_kept() {
+        let mut floor = FloorPictures::default();
+        floor.add(&(0..600).map(tile).collect::<Vec<_>>());
+        assert_eq!(floor.tiles.len(), MAX_PICTURES);
+        assert!(!floor.tiles.contains_key(&(0, 0)) && floor.tiles.contains_key(&(599, 0)));
+    }
 }
