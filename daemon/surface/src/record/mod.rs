@@ -3,6 +3,7 @@
 mod cells;
 mod event;
 mod memory;
+mod vehicle_memory;
 
 pub use super::label_book::StoredLabel;
 pub use super::log::StoredLogEntry;
@@ -12,5 +13,7 @@ pub use event::{
     StoredCommandChange, StoredContact, StoredDraft, StoredImage, StoredIntent, StoredMarker, StoredNote, StoredOrder,
     StoredPlaces, StoredRange, StoredRequest, VehicleEvent, decode, encode,
 };
-pub use memory::{Began, SurfaceMemory, VehicleMemory};
-pub(crate) use memory::{MAX_COMMAND_CHANGES, MAX_MARKERS};
+pub(crate) use memory::MAX_COMMAND_CHANGES;
+pub use memory::{Began, SurfaceMemory};
+pub(crate) use vehicle_memory::MAX_MARKERS;
+pub use vehicle_memory::VehicleMemory;

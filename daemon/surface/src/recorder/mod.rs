@@ -285,14 +285,14 @@ fn contact_changes(
     if memory.contact != contact {
         events.push(VehicleEvent::Contact(contact));
     }
-    let points = new_points(&record.track, memory.track_total);
+    let points = new_points(&record.track, memory.travel.track_total);
     if !points.is_empty() {
         events.push(VehicleEvent::Track { total: record.track.total(), points });
     }
     let report = record.registration.latest().map(|(report, at)| (at.as_micros(), report.encode().to_vec()));
-    if memory.registration != report {
+    if memory.travel.registration != report {
         let closures = record.registration.closures();
-        let (total, closures) = (closures.total(), new_points(closures, memory.closures_total));
+        let (total, closures) = (closures.total(), new_points(closures, memory.travel.closures_total));
         events.push(VehicleEvent::Registration { report, total, closures });
     }
     let [faults] = record.status(view).map_or(EquipmentFaults::default(), |(status, _)| status.faults).encode();
@@ -354,25 +354,26 @@ fn floor_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut Ve
 fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMemory, events: &mut Vec<VehicleEvent>) {
     let orders: Vec<_> = view.slots().map(stored::order).collect();
     let series = view.series().get();
-    if (memory.series, &memory.orders) != (series, &orders) {
+    if (memory.orders.series, &memory.orders.sent) != (series, &orders) {
         events.push(VehicleEvent::Orders { series, orders });
     }
     let intent = stored::intent(record);
-    if memory.intent != intent {
+    if memory.orders.intent != intent {
         events.push(VehicleEvent::Intent(intent));
     }
     let places = stored::places(record);
-    if memory.places != places {
+    if memory.orders.places != places {
         events.push(VehicleEvent::Places(places));
     }
     let in_force: Vec<Vec<u8>> = view.in_force_memory().map(stored::slot_bytes).collect();
-    if memory.in_force != in_force {
+    if memory.orders.in_force != in_force {
         events.push(VehicleEvent::InForce(in_force));
     }
-    let labels: BTreeSet<u8> = record.annotations.labels.keys().chain(memory.labels.keys()).copied().collect();
+    let labels: BTreeSet<u8> =
+        record.annotations.labels.keys().chain(memory.annotations.labels.keys()).copied().collect();
     for label in labels {
         let book = record.annotations.labels.get(&label).cloned().unwrap_or_default();
-        if memory.labels.get(&label).cloned().unwrap_or_default() != book {
+        if memory.annotations.labels.get(&label).cloned().unwrap_or_default() != book {
             events.push(VehicleEvent::Label { label, book });
         }
     }
@@ -380,15 +381,15 @@ fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMe
     if memory.tree != tree {
         events.push(VehicleEvent::Tree(tree));
     }
-    let known = memory.notes.back();
+    let known = memory.annotations.notes.back();
     let first_new = record.annotations.notes.iter().rposition(|note| Some(note) == known).map_or(0, |at| at + 1);
     events.extend(record.annotations.notes.iter().skip(first_new).cloned().map(VehicleEvent::Note));
-    if memory.draft != record.annotations.draft {
+    if memory.annotations.draft != record.annotations.draft {
         events.push(VehicleEvent::Draft(record.annotations.draft.clone()));
     }
     let markers = &record.annotations.markers;
-    let gone = memory.markers.keys().filter(|number| !markers.contains_key(number));
+    let gone = memory.annotations.markers.keys().filter(|number| !markers.contains_key(number));
     events.extend(gone.copied().map(VehicleEvent::MarkerGone));
-    let news = markers.values().filter(|marker| memory.markers.get(&marker.number) != Some(marker));
+    let news = markers.values().filter(|marker| memory.annotations.markers.get(&marker.number) != Some(marker));
     events.extend(news.cloned().map(VehicleEvent::Marker));
 }

@@ -28,11 +28,11 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
     for (&number, vehicle) in &memory.vehicles {
         let Some(address) = Address::vehicle(number) else { continue };
         let (series, orders) =
-            (Series::from_random(vehicle.series), vehicle.orders.iter().filter_map(stored::progress));
+            (Series::from_random(vehicle.orders.series), vehicle.orders.sent.iter().filter_map(stored::progress));
         if !surface.link.restore_orders(address, series, orders, now) {
             continue;
         }
-        let known = vehicle.in_force.iter().filter_map(|bytes| stored::slot(bytes));
+        let known = vehicle.orders.in_force.iter().filter_map(|bytes| stored::slot(bytes));
         surface.link.restore_in_force(address, known);
         let record = surface.records.entry(address).or_insert_with(|| VehicleRecord::new(vehicle.name.clone()));
         restore_record(record, vehicle);
@@ -41,16 +41,17 @@ pub(super) fn restore(surface: &mut Surface, memory: &SurfaceMemory, configured:
 
 fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     (record.run, record.epoch) = (memory.id.run, memory.id.epoch);
-    stored::restore_intent(&memory.intent, record);
-    stored::restore_places(&memory.places, record);
+    stored::restore_intent(&memory.orders.intent, record);
+    stored::restore_places(&memory.orders.places, record);
     let track = |points: &VecDeque<(u64, f64, f64)>, total| {
         Track::restored(points.iter().map(|&(at, x, y)| (Instant::from_micros(at), x, y)), total)
     };
-    record.track = track(&memory.track, memory.track_total);
-    let report = memory.registration.as_ref().and_then(|(at, bytes)| {
+    record.track = track(&memory.travel.track, memory.travel.track_total);
+    let report = memory.travel.registration.as_ref().and_then(|(at, bytes)| {
         Some((RegistrationReport::decode((**bytes).try_into().ok()?), Instant::from_micros(*at)))
     });
-    record.registration = RegistrationRecord::restored(report, track(&memory.closures, memory.closures_total));
+    record.registration =
+        RegistrationRecord::restored(report, track(&memory.travel.closures, memory.travel.closures_total));
     let last_received = memory.contact.last_received.map(Instant::from_micros);
     let faults = EquipmentFaults::decode(memory.faults);
     let status = memory.contact.status().map(|(status, at)| (VehicleStatus { faults, ..status }, at));
@@ -68,9 +69,9 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     let mut floor: Vec<_> = memory.floor.values().map(stored::exemplar).collect();
     floor.sort_by_key(|view| view.received);
     floor.into_iter().for_each(|view| record.floor.insert(view));
-    record.annotations.labels.clone_from(&memory.labels);
+    record.annotations.labels.clone_from(&memory.annotations.labels);
     record.tree = memory.tree();
-    record.annotations.notes.clone_from(&memory.notes);
-    record.annotations.markers.clone_from(&memory.markers);
-    record.annotations.draft.clone_from(&memory.draft);
+    record.annotations.notes.clone_from(&memory.annotations.notes);
+    record.annotations.markers.clone_from(&memory.annotations.markers);
+    record.annotations.draft.clone_from(&memory.annotations.draft);
 }
