@@ -1,4 +1,4 @@
-//! Exemplars on the wire: a small image that shows one label.
+//! Images on the wire: exemplars, each of which shows one label, and views of the sea floor.
 
 use crate::bytes::{Reader, decimetres, put24};
 use crate::directive::ExemplarRequest;
@@ -93,7 +93,50 @@ impl Exemplar {
     }
 }
 
-/// What an exemplar shows: how wide its image is, and where and when it was taken.
+/// A view of the sea floor as an object on the link: a square image with north up. It replaces one with the same middle.
+///
+/// ```text
+/// byte  field
+///  0-2   0, which is no label
+///  3    bits 7-6 size: an edge of 64 << size pixels; bits 5-0 0
+///  4-14 what it shows ([`ExemplarView`]), of a known width
+/// 15..  VP8 key frame without start code and size
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FloorView {
+    /// The edge is 64 << `size` pixels; 0..=3.
+    pub size: u8,
+    /// Its width, at least 1 mm, and its middle. The clock is that of the latest camera frame in it.
+    pub view: ExemplarView,
+    /// The image without its constant bytes, at least one.
+    pub bytes: Vec<u8>,
+}
+
+impl FloorView {
+    /// Encodes header and image for the sender of objects.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut object = vec![0, 0, 0, self.size << 6];
+        self.view.encode(&mut object);
+        object.extend_from_slice(&self.bytes);
+        object
+    }
+
+    /// Decodes an object; `None` if it is another one, such as an exemplar.
+    pub fn decode(object: &[u8]) -> Option<Self> {
+        let (&[0, 0, 0, what], rest) = object.split_first_chunk::<4>()? else { return None };
+        let (view, bytes) = rest.split_first_chunk()?;
+        let view = ExemplarView::decode(view);
+        let is_sound = what & ExemplarRequest::MAX_PICTURE == 0 && view.width_mm > 0 && !bytes.is_empty();
+        is_sound.then(|| Self { size: what >> 6, view, bytes: bytes.to_vec() })
+    }
+
+    /// The WebP file; `None` if the bytes cannot be one. The pixels are not decoded here.
+    pub fn webp(&self) -> Option<Vec<u8>> {
+        unstrip(&self.bytes, edge_px(self.size) as u16)
+    }
+}
+
+/// What an image shows: how wide it is, and where and when it was taken.
 ///
 /// ```text
 /// bytes  field
@@ -210,5 +253,22 @@ mod tests {
         for wrong in [&without_image[..], &[1, 5, 2], &[1, 0, 2, 0], &[1, 255, 2, 0], &[1, 5, 2, 9], &[1, 5, 2, 0, 7]] {
             assert_eq!(Exemplar::decode(wrong), None, "{wrong:?}");
         }
+    }
+
+    #[test]
+    fn golden_bytes_of_a_view_of_the_floor() {
+        let view = ExemplarView { width_mm: 2000, east_dm: 310, north_dm: -10, clock_ms: Some(0x01_0203) };
+        let sent = FloorView { size: 1, view, bytes: vec![0x10, 0, 0, 9] };
+        let object = [0, 0, 0, 0x40, 7, 0xD0, 0, 1, 0x36, 0xFF, 0xFF, 0xF6, 1, 2, 3, 0x10, 0, 0, 9];
+        assert_eq!(sent.encode(), object);
+        assert_eq!((FloorView::decode(&object), Exemplar::decode(&object)), (Some(sent), None));
+        let with = |at: usize, byte: u8| {
+            let mut wrong = object.to_vec();
+            wrong[at] = byte;
+            FloorView::decode(&wrong)
+        };
+        assert_eq!([with(0, 1), with(1, 5), with(2, 1), with(3, 0x41)], [const { None }; 4]);
+        let of_no_width = [&object[..4], &[0; 2], &object[6..]].concat();
+        assert_eq!((FloorView::decode(&of_no_width), FloorView::decode(&object[..15])), (None, None));
     }
 }

@@ -152,6 +152,8 @@ messages! {
         width_m: f64,
         /// Its middle in the world frame.
         middle: Point,
+        /// Whether somebody asked for it.
+        requested: bool,
         /// The codec of the data: jpeg or webp.
         format: String,
         data: Vec<u8>,

@@ -8,6 +8,7 @@ mod assemble;
 mod command;
 mod exemplar_cache;
 pub mod fit;
+mod floor_views;
 mod given_orders;
 mod in_force;
 mod label_book;
@@ -39,6 +40,7 @@ pub use command::{
     CommandRequest, OrderKind,
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
+pub use floor_views::{FloorPlace, FloorViews, floor_list};
 pub use given_orders::{GivenOrders, SentOrder, SettingsRecord};
 pub use label_book::LabelBook;
 pub use link_meter::LinkMeter;

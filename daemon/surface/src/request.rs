@@ -5,13 +5,16 @@ mod maps;
 mod refused;
 
 use crate::fit::{self, Fit};
+use crate::floor_views::{FloorPlace, floor_list};
 use crate::map_cells::MapCells;
 use crate::orders::{
     BudgetOrder, ExemplarAction, ExemplarOrder, LabelOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder,
 };
 use crate::record::StoredLabel;
 use crate::snapshot::command_state;
-use crate::state::{AcceptedOrder, ArchivedMap, CellHistory, CommandState, ReplayEventList, ReplayOrder, ReplayState};
+use crate::state::{
+    AcceptedOrder, ArchivedMap, CellHistory, CommandState, FloorList, ReplayEventList, ReplayOrder, ReplayState,
+};
 use crate::{
     AreasOrder, CommandAction, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind, OrderRefusal,
     RequestKind, SettingsOrder, Surface, order_name,
@@ -45,6 +48,10 @@ pub enum SurfaceRequest {
     FormerLabels(u8, Cell),
     /// Read an image of a label: the one with this number, or the latest.
     Exemplar(u8, u8, Option<u8>),
+    /// Read which images of the sea floor have arrived after a version.
+    Floor(u8, u64),
+    /// Read the image of the sea floor with this middle.
+    FloorImage(u8, FloorPlace),
     /// Read the settings that fit a budget in bit/s, by default the share of the map.
     Fit(u8, Option<f64>),
     /// Send the weights of labels, and those of unexplored cells and of curiosity.
@@ -106,6 +113,7 @@ impl SurfaceRequest {
     pub fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
+            Self::Floor(..) | Self::FloorImage(..) => None,
             Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents => None,
             Self::Report | Self::Barred(..) => None,
             Self::Label(..)
@@ -147,6 +155,7 @@ pub enum Reply {
     /// The surface has done what was requested.
     Done,
     Archives(Vec<ArchivedMap>),
+    Floor(FloorList),
     /// The labels that a cell had before.
     FormerLabels(CellHistory),
     /// The entries of the log, the oldest first.
@@ -238,6 +247,13 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Exemplar(id, label, number) => {
             let record = surface.record(known(surface, id)?)?;
             Reply::File("image/webp", record.exemplars.label(label)?.exemplar(number)?.webp.clone())
+        }
+        SurfaceRequest::Floor(id, since) => {
+            Reply::Floor(floor_list(id, &surface.record(known(surface, id)?)?.floor, since))
+        }
+        SurfaceRequest::FloorImage(id, place) => {
+            let record = surface.record(known(surface, id)?)?;
+            Reply::File("image/webp", record.floor.get(place)?.webp.clone())
         }
         SurfaceRequest::Fit(id, bits_per_s) => match fit(surface, known(surface, id)?, cell_m, bits_per_s) {
             Ok(fit) => Reply::Fit(Box::new(fit)),

@@ -22,6 +22,7 @@ pub use vehicle::{
     ReportedDisk, ReportedFault, ReportedMode, ReportedPose, ReportedRegistration, ReportedTie, StatusReport,
     UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState, WeightDraft,
 };
+pub use vehicle::{FloorImage, FloorList, FloorSummary};
 
 use scenecast_protocol::time::Instant;
 use schemars::JsonSchema;

@@ -10,7 +10,7 @@ use scenecast_config::RestoreOrders;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_core::{Giver, Principal, UsblLine};
 use scenecast_protocol::directive::{Budget, OrderStatus, Slot, SlotId};
-use scenecast_protocol::exemplar::Exemplar;
+use scenecast_protocol::exemplar::{Exemplar, ExemplarView, FloorView};
 use scenecast_protocol::link::{Cycle, Mismatch, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
@@ -363,10 +363,15 @@ impl Surface {
                 Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::Object(vehicle, bytes) => {
-                let exemplar = Exemplar::decode(&bytes)?;
                 let clock = self.link.vehicle(vehicle).and_then(|view| view.clock());
-                let taken = clock.and_then(|clock| exemplar.view.taken(clock, now));
-                let is_new = self.records.get_mut(&vehicle)?.handle_exemplar(&exemplar, taken, now);
+                let taken = |view: &ExemplarView| clock.and_then(|clock| view.taken(clock, now));
+                let record = self.records.get_mut(&vehicle)?;
+                if let Some(floor) = FloorView::decode(&bytes) {
+                    let is_new = record.floor.handle(&floor, taken(&floor.view), now);
+                    return is_new.then_some(SurfaceOutput::Changed(vehicle));
+                }
+                let exemplar = Exemplar::decode(&bytes)?;
+                let is_new = record.handle_exemplar(&exemplar, taken(&exemplar.view), now);
                 if is_new {
                     let text = match exemplar.bytes.is_empty() {
                         true => format!("no image of label {} yet", exemplar.label),

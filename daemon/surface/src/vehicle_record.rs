@@ -3,6 +3,7 @@
 use super::annotations::AnnotationRefusal;
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
+use super::floor_views::FloorViews;
 use super::given_orders::GivenOrders;
 use super::label_book::LabelBook;
 use super::map_changes::{Corrections, LabelGains};
@@ -60,6 +61,7 @@ pub struct VehicleRecord {
     pub name: String,
     pub orders: GivenOrders,
     pub exemplars: ExemplarCache,
+    pub floor: FloorViews,
     /// Reported positions in the map frame.
     pub track: Track,
     /// How its camera frames were placed on the map.
@@ -98,6 +100,7 @@ impl VehicleRecord {
             name,
             orders: GivenOrders::default(),
             exemplars: ExemplarCache::default(),
+            floor: FloorViews::default(),
             track: Track::default(),
             registration: RegistrationRecord::default(),
             run: 1,
@@ -115,6 +118,7 @@ impl VehicleRecord {
     /// The vehicle has begun another run, with a map of its own.
     pub fn begin_run(&mut self) {
         self.run += 1;
+        self.floor = FloorViews::default();
         self.labels.begin_run();
     }
 

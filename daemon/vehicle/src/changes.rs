@@ -1,5 +1,6 @@
 //! Changes of the map: what its producers, the scene model and other programs, give the vehicle.
 
+use crate::mosaic::FloorTile;
 use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_protocol::map::{Cell, ClassEntry, LabelTree, LayerDescriptor, LayerId};
@@ -19,6 +20,8 @@ pub struct MapChanges {
     pub classes: Vec<ClassEntry>,
     /// The perplexity of cells under the scene model.
     pub perplexity: Vec<(Cell, f32)>,
+    /// New pictures of the sea floor, which do not wait for labels.
+    pub floor: Vec<FloorTile>,
     /// The camera frame after which the map is so; `None` if it is no frame's.
     pub frame: Option<SeenFrame>,
 }

@@ -2,6 +2,7 @@
 
 use super::cells::{CellChanges, Cells, LayerScales};
 use super::frame::{Frame, Projection};
+use super::mosaic::Mosaic;
 use super::picker::{Judge, PATCH_PX};
 use super::placer::FramePlacer;
 use crate::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame, SharedExemplars};
@@ -56,6 +57,7 @@ pub struct Mapper {
     pub(super) habitats: Option<Habitats>,
     pub(super) book: LabelBook,
     pub(super) exemplars: Exemplars,
+    mosaic: Mosaic,
     pub(super) cells: Cells,
     pub(super) placer: FramePlacer,
     scales: LayerScales,
@@ -180,6 +182,7 @@ impl Mapper {
             habitats: (config.scene.labels == SceneLabels::Habitats).then(|| Habitats::new(config.scene.max_labels)),
             book: LabelBook::new(epoch),
             exemplars: Exemplars::new(config.camera.metres_per_pixel),
+            mosaic: Mosaic::default(),
             cells: Cells::default(),
             placer: FramePlacer::new(config),
             scales: LayerScales::new(config),
@@ -221,13 +224,14 @@ impl Mapper {
         if frame.view.is_some() {
             cell_px = cell_px.clamp(CELL_PX.0, CELL_PX.1);
         }
-        let words = match &mut self.light {
-            Some(light) => {
-                light.learn(image);
-                self.extractor.extract(&light.corrected(image), cell_px)
-            }
-            None => self.extractor.extract(image, cell_px),
-        };
+        let corrected = self.light.as_mut().map(|light| {
+            light.learn(image);
+            light.corrected(image)
+        });
+        let even = corrected.as_ref().unwrap_or(image);
+        let words = self.extractor.extract(even, cell_px);
+        let (size, cell_m) = (image.dimensions(), self.cell_m);
+        self.mosaic.add(even, |words| projection.project(size, &pose, words), cell_m, t_s);
         let observations = projection.project(image.dimensions(), &pose, &words);
         self.online.expect(observations.len(), &mut self.model);
         self.model.insert(t_s, &observations);
@@ -239,7 +243,7 @@ impl Mapper {
         self.model.refine(self.tuning.words_to_refine(passed));
         self.flat = self.online.learn(t_s, &self.model);
         self.add_habitats(image, &projection, &pose, cell_px);
-        let (cell_m, metres_per_pixel) = (self.cell_m, projection.metres_per_pixel());
+        let metres_per_pixel = projection.metres_per_pixel();
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
         judge.review(&mut self.exemplars.store);
         let place = |u: f32, v: f32| {
@@ -272,7 +276,8 @@ impl Mapper {
         let changes = self.cells.take(&published, t_s, &self.scales);
         let cells = changes.labels.iter().map(|shown| (Cell::new(shown.x, shown.y), shown.label)).collect();
         let frame = Some(self.seen_frame(&changes, t_s, camera));
-        MapChanges { labels: Some(self.labelled(cells)), frame, ..changes.into() }
+        let floor = self.mosaic.poll_settled(self.cell_m, t_s);
+        MapChanges { labels: Some(self.labelled(cells)), frame, floor, ..changes.into() }
     }
 
     fn seen_frame(&self, changes: &CellChanges<'_>, t_s: f64, camera: Pose) -> SeenFrame {

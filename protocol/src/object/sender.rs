@@ -130,8 +130,10 @@ impl ObjectSender {
         self.usual_room = room.max(self.usual_room - self.usual_room.div_ceil(128));
         let (usual, loss) = (self.usual_room, self.loss);
         let (run, part) = {
-            let mut of_kind = self.objects.iter_mut().filter(|o| o.is_background() == is_background);
-            of_kind.find_map(|o| o.next_part(room, usual, loss))?
+            // What is sent last gives way within the queue too.
+            let mut of_kind: Vec<_> = self.objects.iter_mut().filter(|o| o.is_background() == is_background).collect();
+            of_kind.sort_by_key(|o| o.priority == Priority::Last);
+            of_kind.into_iter().find_map(|o| o.next_part(room, usual, loss))?
         };
         Some((ObjectId::of(run.serial), run, part))
     }

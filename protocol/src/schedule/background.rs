@@ -12,6 +12,8 @@ pub enum BackgroundStream {
     Finer,
     /// Images of labels of which the surface has none, though nobody has requested them.
     Exemplars,
+    /// Images of the sea floor, tile by tile.
+    Floor,
     /// A layer of the map, if it has no share.
     Layer(LayerId),
 }
@@ -19,10 +21,11 @@ pub enum BackgroundStream {
 impl BackgroundStream {
     const FINER: &str = "finer";
     const EXEMPLARS: &str = "exemplars";
+    const FLOOR: &str = "floor";
 
     /// The streams of a map with these layers, in the order in which people are shown them.
     pub fn all(layers: &LayerSet) -> impl Iterator<Item = Self> {
-        [Self::Finer, Self::Exemplars].into_iter().chain(layers.iter().map(|(id, _)| Self::Layer(id)))
+        [Self::Finer, Self::Exemplars, Self::Floor].into_iter().chain(layers.iter().map(|(id, _)| Self::Layer(id)))
     }
 
     /// The name of the stream in files and in the API.
@@ -30,6 +33,7 @@ impl BackgroundStream {
         match self {
             Self::Finer => Self::FINER.to_owned(),
             Self::Exemplars => Self::EXEMPLARS.to_owned(),
+            Self::Floor => Self::FLOOR.to_owned(),
             Self::Layer(id) => layers.name(id),
         }
     }
@@ -38,6 +42,7 @@ impl BackgroundStream {
         match name {
             Self::FINER => Some(Self::Finer),
             Self::EXEMPLARS => Some(Self::Exemplars),
+            Self::FLOOR => Some(Self::Floor),
             _ => layers.id(name).map(Self::Layer),
         }
     }
@@ -46,7 +51,7 @@ impl BackgroundStream {
     pub fn class(self) -> Class {
         match self {
             Self::Finer => Class::Map,
-            Self::Exemplars => Class::Exemplar,
+            Self::Exemplars | Self::Floor => Class::Exemplar,
             Self::Layer(id) => Class::Layer(id),
         }
     }
@@ -56,6 +61,7 @@ impl BackgroundStream {
             Self::Layer(id) => id.index() as u64,
             Self::Finer => 16,
             Self::Exemplars => 17,
+            Self::Floor => 18,
         }
     }
 
@@ -63,6 +69,7 @@ impl BackgroundStream {
         match number {
             16 => Some(Self::Finer),
             17 => Some(Self::Exemplars),
+            18 => Some(Self::Floor),
             _ => LayerId::new(number as usize).map(Self::Layer),
         }
     }
@@ -91,10 +98,10 @@ pub enum BackgroundError {
 /// then are cells like all others.
 ///
 /// ```text
-///   5 bits              5 bits for each, the first one first              0 to 7
-/// +-------------------+-------------------------------------------------+-------
-/// | number of streams | 0 to 15: that layer, 16 finer cells, 17 exemplars | zeros
-/// +-------------------+-------------------------------------------------+-------
+///   5 bits              5 bits for each, the first one first                        0 to 7
+/// +-------------------+-----------------------------------------------------------+-------
+/// | number of streams | 0 to 15: that layer, 16 finer cells, 17 exemplars, 18 floor | zeros
+/// +-------------------+-----------------------------------------------------------+-------
 /// ```
 ///
 /// ```
@@ -111,17 +118,19 @@ pub enum BackgroundError {
 pub struct BackgroundOrder([Option<BackgroundStream>; BackgroundOrder::MAX_STREAMS]);
 
 impl Default for BackgroundOrder {
-    /// Finer cells, depths, exemplars, confidences.
+    /// Finer cells, depths, exemplars, confidences, the floor.
     fn default() -> Self {
         let [depth, confidence] = [LayerId::DEPTH, LayerId::CONFIDENCE].map(BackgroundStream::Layer);
-        let mut streams = [BackgroundStream::Finer, depth, BackgroundStream::Exemplars, confidence].into_iter();
+        let streams =
+            [BackgroundStream::Finer, depth, BackgroundStream::Exemplars, confidence, BackgroundStream::Floor];
+        let mut streams = streams.into_iter();
         Self(std::array::from_fn(|_| streams.next()))
     }
 }
 
 impl BackgroundOrder {
-    /// Each layer once, finer cells, and exemplars.
-    const MAX_STREAMS: usize = LayerId::COUNT + 2;
+    /// Each layer once, finer cells, exemplars, and the floor.
+    const MAX_STREAMS: usize = LayerId::COUNT + 3;
 
     /// These streams in this order; `None` if one is named twice.
     pub fn new(streams: &[BackgroundStream]) -> Option<Self> {
@@ -194,12 +203,12 @@ mod tests {
         golden(&[FINER, DEPTH, EXEMPLARS, CONFIDENCE], &[0x24, 0x01, 0x10, 0x80]);
         golden(&[BackgroundStream::Layer(LayerId::new(15).unwrap()), CURIOSITY], &[0x13, 0xC4]);
         // Another filling, too few or too many bytes, a stream without a number, the same one twice.
-        for wrong in [&[][..], &[1], &[0x13], &[0x13, 0xC5], &[0, 0], &[0x0C, 0x80], &[0x10, 0x00], &[0x9A, 0]] {
+        for wrong in [&[][..], &[1], &[0x13], &[0x13, 0xC5], &[0, 0], &[0x0C, 0xC0], &[0x10, 0x00], &[0x9A, 0]] {
             assert_eq!(BackgroundOrder::from_bytes(wrong), None, "{wrong:02X?}");
         }
-        let everything: Vec<_> = (0..18).rev().filter_map(BackgroundStream::from_number).collect();
+        let everything: Vec<_> = (0..19).rev().filter_map(BackgroundStream::from_number).collect();
         let order = BackgroundOrder::new(&everything).unwrap();
-        assert_eq!((order.to_bytes().len(), BackgroundOrder::from_bytes(&order.to_bytes())), (12, Some(order)));
+        assert_eq!((order.to_bytes().len(), BackgroundOrder::from_bytes(&order.to_bytes())), (13, Some(order)));
     }
 
     #[test]
@@ -209,7 +218,7 @@ mod tests {
         let names = BUILT_IN_LAYERS.each_ref().map(|layer| &*layer.descriptor.name).join(", ");
         assert_eq!(
             message.to_string(),
-            format!("background \"sonar\": it takes different ones of finer, exemplars, {names}")
+            format!("background \"sonar\": it takes different ones of finer, exemplars, floor, {names}")
         );
         let repeated = BackgroundOrder::from_names(&["depth", "depth"], &layers);
         assert!(matches!(repeated, Err(BackgroundError::Repeated { .. })));
@@ -230,7 +239,7 @@ mod tests {
         }
 
         #[test]
-        fn orders_round_trip(numbers in proptest::sample::subsequence((0u64..18).collect::<Vec<_>>(), 0..=18).prop_shuffle()) {
+        fn orders_round_trip(numbers in proptest::sample::subsequence((0u64..19).collect::<Vec<_>>(), 0..=19).prop_shuffle()) {
             let streams: Vec<_> = numbers.into_iter().filter_map(BackgroundStream::from_number).collect();
             let order = BackgroundOrder::new(&streams).unwrap();
             prop_assert_eq!(BackgroundOrder::from_bytes(&order.to_bytes()), Some(order));

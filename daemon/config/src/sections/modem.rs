@@ -94,9 +94,9 @@ section! {
         /// % or less. A class that is left out keeps its default.
         shares: Shares = Shares::default(), range(0.0, 100.0, "%"), [Auv Asv Scenario];
         /// Background streams: data that is sent with spare capacity only, in this order. finer: the cells between
-        /// those of a coarse map; exemplars: images of new labels that nobody requested; the name of a layer: that layer,
-        /// if it has no share. A stream that is not listed is not sent. Without finer in the list, finer
-        /// cells are sent before all background streams.
+        /// those of a coarse map; exemplars: images of new labels that nobody requested; floor: images of the sea floor
+        /// itself; the name of a layer: that layer, if it has no share. A stream that is not listed is not sent. Without
+        /// finer in the list, finer cells are sent before all background streams.
         background: BackgroundOrder = BackgroundOrder::default(), ANY, [Auv Asv Scenario];
         /// Time between two status reports of the vehicle.
         status_period_s: f64 = 10.0, range(1.0, 3600.0, "s"), [Auv Scenario];

@@ -50,6 +50,8 @@ export const removeMarker = (id, number) => write(`/vehicles/${id}/markers/remov
 export const dismissEarlierMap = (id) => write(`/vehicles/${id}/earlier-map/dismiss`, {});
 /** The maps of runs that have ended, the newest first. */
 export const readArchive = async () => (await read("/archive")).maps;
+/** The images of the sea floor that have arrived after version `since`, and the version of the last. */
+export const readFloor = (id, since) => read(`/vehicles/${id}/floor?since=${since}`);
 /** The labels that a cell had before: {label, until_s}, the newest first. */
 export const readCellHistory = async (id, x, y) => (await read(`/vehicles/${id}/cells/${x}/${y}`)).former;
 /** The entries of the mission's log after number `since`, the oldest first. */

@@ -15,7 +15,8 @@ use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
 use scenecast_surface::fit::Fit;
 use scenecast_surface::state::{
-    AcceptedOrder, CellHistory, CommandState, MissionState, PrincipalInfo, ReplayEventList, ReplayOrder, ReplayState,
+    AcceptedOrder, CellHistory, CommandState, FloorList, MissionState, PrincipalInfo, ReplayEventList, ReplayOrder,
+    ReplayState,
 };
 use scenecast_surface::{
     CommandOrder, DismissOrder, DraftOrder, LabelOrder, MarkerOrder, NoteOrder, RemoveMarkerOrder, Role, SurfaceRequest,
@@ -208,6 +209,20 @@ fn readings() -> Vec<Operation> {
             "A received image of a label: the latest as in 3.webp, or the one with a number as in 3-17.webp",
             Content::File("image/webp"),
             || get(readings::exemplar),
+        ),
+        read(
+            "/api/v2/vehicles/{id}/floor",
+            "floor",
+            "The images of the sea floor itself that have arrived, or those after the version `since`",
+            Content::Json(schema::<FloorList>),
+            || get(readings::floor),
+        ),
+        read(
+            "/api/v2/vehicles/{id}/floor/{file}",
+            "floor_image",
+            "A received image of the sea floor, by its address in the list",
+            Content::File("image/webp"),
+            || get(readings::floor_image),
         ),
         read(
             "/api/v2/vehicles/{id}/fit",

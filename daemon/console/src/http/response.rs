@@ -33,6 +33,7 @@ pub(super) fn respond(reply: Reply) -> Response {
         // The handler of the log makes its lines.
         Reply::Log(_) => not_found(),
         Reply::FormerLabels(history) => Json(history).into_response(),
+        Reply::Floor(list) => Json(list).into_response(),
         Reply::Archives(maps) => Json(ArchiveList { maps }).into_response(),
         Reply::Command(command) => Json(command).into_response(),
         Reply::Replay(replay) => Json(*replay).into_response(),

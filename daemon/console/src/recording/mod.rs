@@ -139,6 +139,8 @@ pub(crate) struct Known {
     pub(crate) name: String,
     pub(crate) map: MapHistory,
     pub(crate) exemplars: Vec<(u64, Exemplar)>,
+    /// Views of the sea floor in the frame of the map.
+    pub(crate) floor: Vec<(u64, Exemplar)>,
     /// When each frame came in: at a surface of those of the vehicle, at a vehicle of those of the surface.
     pub(crate) heard: Vec<u64>,
     pub(crate) poses: Vec<(u64, PoseWithCovarianceStamped)>,
@@ -326,6 +328,7 @@ impl Record {
                 descriptor.into_iter().for_each(|descriptor| known.map.describe(descriptor));
             }
             "exemplars" => known.exemplars.extend(message.decode().map(|exemplar| (nanos, exemplar))),
+            "floor" => known.floor.extend(message.decode().map(|view| (nanos, view))),
             "orders" => known.given.extend(message.decode::<Order>()),
             "order_status" => known.orders.extend(message.decode::<OrderStatus>()),
             "link" => known.link.extend(message.decode().map(|link| (nanos, link))),
@@ -379,6 +382,7 @@ impl Known {
         }
         self.map.add(later.map, moved);
         self.exemplars.extend(later.exemplars.into_iter().map(|(at, exemplar)| (moved(at), exemplar)));
+        self.floor.extend(later.floor.into_iter().map(|(at, view)| (moved(at), view)));
         self.heard.extend(later.heard.into_iter().map(moved));
         self.frames.add(&later.frames);
         later.sent_bits.into_iter().for_each(|(content, bits)| *self.sent_bits.entry(content).or_default() += bits);

@@ -1,6 +1,7 @@
 //! The replay of a mission from its records: the state that the page shows at any moment of it, as each side knew it.
 
 mod events;
+mod floor;
 mod on_board;
 
 use crate::recording::{Known, Recording};
@@ -250,6 +251,10 @@ impl Replay {
             SurfaceRequest::Exemplar(id, label, number) => {
                 let bytes = self.exemplar(part(id)?, label, number)?;
                 Reply::File("image/webp", bytes)
+            }
+            SurfaceRequest::Floor(id, since) => Reply::Floor(self.floor(id, part(id)?, since)),
+            SurfaceRequest::FloorImage(id, place) => {
+                Reply::File("image/webp", self.floor_image(part(id)?, place)?.data.clone())
             }
             SurfaceRequest::Log => Reply::Log(self.log()),
             SurfaceRequest::Archives => Reply::Archives(Vec::new()),

@@ -99,8 +99,9 @@ fn images(state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let other = all().filter(|image| !vehicle.shows_class(state, image)).count();
     (other > 0).then(|| {
         format!(
-            "{other} of the {} lie where the map at the end has another class than that of which they were sent as examples.",
-            words::counted(all().count(), "image that arrived", "images that arrived")
+            "{other} of the {} {} where the map at the end has another class than that of which they were sent as examples.",
+            words::counted(all().count(), "image that arrived", "images that arrived"),
+            if other == 1 { "lies" } else { "lie" }
         )
     })
 }

@@ -1,4 +1,4 @@
-//! What came of the orders that send a vehicle somewhere, by its path while they were in force.
+//! What came of the orders about the way of a vehicle, by its path while they were in force.
 
 use super::dive::{Dive, DiveVehicle};
 use super::order_step::OrderKey;
@@ -7,7 +7,7 @@ use super::{Escaped, words};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::OrderStatus;
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
-use scenecast_protocol::directive::{Fence, Polygon, SlotId};
+use scenecast_protocol::directive::{Fence, Polygon, SlotId, WeightedArea};
 use scenecast_protocol::wire::VehicleMode;
 use scenecast_surface::state::VehicleState;
 use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder};
@@ -18,59 +18,60 @@ use std::fmt::Write;
 /// Farther from its place, a vehicle has not arrived there, metres.
 const ARRIVED_M: f64 = 3.0;
 
-/// Where an order sends a vehicle.
+/// What an order asks of the way of a vehicle.
 enum Aim {
-    /// To the sea floor of classes, given by the labels that stand for them.
-    Classes(BTreeSet<u8>),
-    /// Into areas that it weighs more than others.
-    Areas(Vec<Polygon>),
-    /// To a place, metres east and north.
+    /// To be over the sea floor of the first labels, and not over that of the others.
+    Labels(BTreeSet<u8>, BTreeSet<u8>),
+    /// To be in the first areas, and not in the others.
+    Areas(Vec<Polygon>, Vec<Polygon>),
+    /// To go to a place, metres east and north.
     Place([f64; 2]),
-    /// Not out of a fence, nor into areas to stay out of.
+    /// To stay within a fence, and out of areas.
     Fence(Fence),
+    /// To stay where it is.
+    Hold,
 }
 
 impl Aim {
-    /// `None` if the order sends the vehicle nowhere.
-    fn of(state: &VehicleState, slot: &str, content: &str) -> Option<Self> {
+    /// `None` if the order asks for no way.
+    fn of(slot: &str, content: &str) -> Option<Self> {
+        let members = || serde_json::from_str::<Value>(content).ok();
         if slot == SlotId::Utility.name() {
-            let content: Value = serde_json::from_str(content).ok()?;
-            let weights = content.get("weights")?.as_object()?.iter();
-            let favoured = weights.filter(|(_, weight)| weight.as_f64().is_some_and(|weight| weight > 0.0));
-            let labels = favoured.filter_map(|(label, _)| label.parse().ok());
-            let classes: BTreeSet<u8> = labels.map(|label| state.label_book.shown_as(label)).collect();
-            return (!classes.is_empty()).then_some(Self::Classes(classes));
+            let members = members()?;
+            let weights = members.get("weights")?.as_object()?.iter();
+            let weights = weights.filter_map(|(label, weight)| Some((label.parse::<u8>().ok()?, weight.as_f64()?)));
+            let (mut to, mut from) = (BTreeSet::new(), BTreeSet::new());
+            weights.filter(|(_, weight)| *weight != 0.0).for_each(|(label, weight)| {
+                if weight > 0.0 { &mut to } else { &mut from }.insert(label);
+            });
+            return (!to.is_empty() || !from.is_empty()).then_some(Self::Labels(to, from));
         }
         if slot == SlotId::Areas.name() {
             let areas = serde_json::from_str::<AreasOrder>(content).ok()?.read().ok()?.0;
-            let areas: Vec<Polygon> =
-                areas.into_iter().filter(|area| area.weight > 0).map(|area| area.outline).collect();
-            return (!areas.is_empty()).then_some(Self::Areas(areas));
+            let (to, from): (Vec<_>, Vec<_>) = areas.into_iter().partition(|area| area.weight > 0);
+            let outlines = |areas: Vec<WeightedArea>| areas.into_iter().map(|area| area.outline).collect::<Vec<_>>();
+            return (!to.is_empty() || !from.is_empty()).then(|| Self::Areas(outlines(to), outlines(from)));
         }
         if slot == SlotId::Destination.name() {
             return serde_json::from_str::<DestinationOrder>(content).ok()?.place.map(Self::Place);
         }
+        if slot == SlotId::Constraints.name() {
+            let members = members()?;
+            let is_set = |name: &str| members.get(name).and_then(Value::as_bool).unwrap_or_default();
+            return (is_set("hold") && !is_set("abort")).then_some(Self::Hold);
+        }
         let fence = (slot == SlotId::Fence.name()).then(|| serde_json::from_str::<FenceOrder>(content))?.ok()?;
         fence.read().ok().map(Self::Fence).filter(|_| fence.fence.is_some() || !fence.keep_outs.is_empty())
     }
-
-    /// Whether a place is where the order sends the vehicle.
-    fn holds(&self, state: &VehicleState, vehicle: &DiveVehicle, point: &TrackPoint) -> bool {
-        let at = DecimetrePoint::nearest(WorldPoint { east_m: point.east_m, north_m: point.north_m });
-        let is_in = |area: &Polygon| at.is_some_and(|at| area.contains(at));
-        match self {
-            Self::Classes(classes) => {
-                let label = vehicle.label_at(state.map.shift_m(), point.east_m, point.north_m);
-                label != 0 && classes.contains(&state.label_book.shown_as(label))
-            }
-            Self::Areas(areas) => areas.iter().any(is_in),
-            Self::Place([east_m, north_m]) => (point.east_m - east_m).hypot(point.north_m - north_m) <= ARRIVED_M,
-            Self::Fence(fence) => fence.fence.as_ref().is_none_or(is_in) && !fence.keep_outs.iter().any(is_in),
-        }
-    }
 }
 
-/// The time that a vehicle was under way in a span, and how much of it where an order sends it; seconds of the clock.
+/// Whether a place lies in an area.
+fn is_in(point: &TrackPoint, area: &Polygon) -> bool {
+    let at = DecimetrePoint::nearest(WorldPoint { east_m: point.east_m, north_m: point.north_m });
+    at.is_some_and(|at| area.contains(at))
+}
+
+/// The time that a vehicle was under way in a span, and how much of it at some places; seconds of the clock.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Stay {
     all_s: f64,
@@ -86,22 +87,30 @@ impl Stay {
 }
 
 impl DiveVehicle {
-    /// Where it was between two moments, while `is_counted`.
+    /// Where it was between two moments, while `is_counted`: on straight lines between its places.
     fn stay(
         &self,
         span_s: (f64, f64),
         is_counted: impl Fn(f64) -> bool,
         is_there: impl Fn(&TrackPoint) -> bool,
     ) -> Stay {
+        /// Length of the pieces of these lines, metres.
+        const PIECE_M: f64 = 0.25;
         let mut stay = Stay::default();
         let steps = self.legs().flat_map(|leg| leg.iter().zip(leg.iter().skip(1)));
-        for (from, to) in
-            steps.filter(|(from, to)| from.at_s >= span_s.0 && to.at_s <= span_s.1 && is_counted(from.at_s))
+        for (from, to) in steps.filter(|(from, to)| to.at_s > from.at_s && to.at_s >= span_s.0 && from.at_s <= span_s.1)
         {
-            stay.all_s += to.at_s - from.at_s;
-            if is_there(from) {
-                stay.there_s += to.at_s - from.at_s;
-                stay.first_s = stay.first_s.or(Some(from.at_s));
+            let pieces = (from.distance_m(to) / PIECE_M).ceil().clamp(1.0, 1000.0) as u32;
+            let piece_s = (to.at_s - from.at_s) / f64::from(pieces);
+            for n in 0..pieces {
+                let point = from.towards(to, (f64::from(n) + 0.5) / f64::from(pieces));
+                if (span_s.0..=span_s.1).contains(&point.at_s) && is_counted(point.at_s) {
+                    stay.all_s += piece_s;
+                    if is_there(&point) {
+                        stay.there_s += piece_s;
+                        stay.first_s = stay.first_s.or(Some(point.at_s));
+                    }
+                }
             }
         }
         stay
@@ -118,6 +127,12 @@ impl DiveVehicle {
         applied.sort_by(|a, b| a.0.total_cmp(&b.0));
         applied
     }
+
+    /// The share of the cells of its map that have one of these labels.
+    fn share_of_map(&self, labels: &BTreeSet<u8>) -> String {
+        let theirs = self.labels.iter().filter(|(_, label)| labels.contains(label)).count();
+        format!("{:.0} %", theirs as f64 / self.labels.explored().max(1) as f64 * 100.0)
+    }
 }
 
 /// What came of an order while it was in force.
@@ -131,16 +146,17 @@ pub(super) struct Effect<'a> {
 }
 
 impl Dive {
-    /// What came of each order that sent the vehicle somewhere, the first one first.
+    /// What came of each order about the way of the vehicle, the first one first.
     pub(super) fn effects<'a>(&self, state: &VehicleState, vehicle: &'a DiveVehicle) -> Vec<Effect<'a>> {
         let Some(ended_s) = vehicle.path().last().map(|last| last.at_s) else { return Vec::new() };
         let mut effects = Vec::new();
-        for slot in [SlotId::Utility, SlotId::Areas, SlotId::Destination, SlotId::Fence] {
+        for slot in [SlotId::Utility, SlotId::Areas, SlotId::Destination, SlotId::Fence, SlotId::Constraints] {
             let applied = vehicle.applied(slot.name());
             let ends = applied.iter().skip(1).map(|(at_s, _)| *at_s).chain([ended_s]);
             effects.extend(applied.iter().zip(ends).filter_map(|((from_s, order), to_s)| {
-                let aim = Aim::of(state, slot.name(), &vehicle.given.get(*order)?.content)?;
-                let told = self.effect(state, vehicle, &aim, (*from_s, to_s))?;
+                let aim = Aim::of(slot.name(), &vehicle.given.get(*order)?.content)?;
+                let way = Way { dive: self, state, vehicle, span_s: (*from_s, to_s) };
+                let (told, to_s) = way.effect(&aim)?;
                 Some(Effect { order, from_s: *from_s, to_s, told })
             }));
         }
@@ -163,91 +179,145 @@ impl Dive {
         if rows.is_empty() {
             return;
         }
+        let path = match (vehicle.is_played_back(), vehicle.own.track.len() > 1) {
+            (true, _) => "Its path was that of the recording that was played back: no order could change it.",
+            (_, true) => "By its own record.",
+            (_, false) => "By the places that it reported, and straight lines between them.",
+        };
         let _ = writeln!(
             page,
             "<h3>What came of these orders</h3>\n<table><thead><tr><th>what was ordered</th><th>in force from (UTC)</th><th>to</th>\
-             <th>where the vehicle was meanwhile</th></tr></thead>\n{rows}</table>\n<p>By the places that are known of it and, for classes, \
-             by the map at the end. Other orders may have been in force at the same time; an order to hold, or a place to go to, goes before \
-             weights.</p>"
+             <th>where the vehicle was meanwhile</th></tr></thead>\n{rows}</table>\n<p>{path} Labels are those of the map at the end, each by \
+             itself, as the order weighed them. Other orders may have been in force at the same time: one to hold, or to go to a place, goes \
+             before weights.</p>"
         );
     }
+}
 
-    /// Where the vehicle was while an order was in force, in a clause; `None` if no place of that time is known.
-    fn effect(
-        &self,
-        state: &VehicleState,
-        vehicle: &DiveVehicle,
-        aim: &Aim,
-        (from_s, to_s): (f64, f64),
-    ) -> Option<String> {
-        let modes: Vec<(f64, bool)> = self
-            .modes(state, vehicle)
+/// The way of a vehicle while an order was in force.
+struct Way<'a> {
+    dive: &'a Dive,
+    state: &'a VehicleState,
+    vehicle: &'a DiveVehicle,
+    span_s: (f64, f64),
+}
+
+/// A part of the sea floor that an order favours or has avoided.
+struct Goal<'a> {
+    /// Where that is, such as "over label 3".
+    place: String,
+    is_favoured: bool,
+    /// Its share of the map at the end, where it is one of labels.
+    of_map: Option<String>,
+    has: Box<dyn Fn(&TrackPoint) -> bool + 'a>,
+}
+
+impl Way<'_> {
+    /// What came of an order in a clause, and when it was over; `None` if no place of that time is known.
+    fn effect(&self, aim: &Aim) -> Option<(String, f64)> {
+        let told = match aim {
+            Aim::Labels(to, from) => self.surveyed(&[self.labels(to, true), self.labels(from, false)]),
+            Aim::Areas(to, from) => self.surveyed(&[areas(to, true), areas(from, false)]),
+            Aim::Place(place) => return self.arrival(*place),
+            Aim::Fence(fence) => self.fenced(fence)?,
+            Aim::Hold => self.held()?,
+        };
+        Some((told, self.span_s.1))
+    }
+
+    fn labels(&self, labels: &BTreeSet<u8>, is_favoured: bool) -> Option<Goal<'_>> {
+        let names: Vec<String> = labels.iter().map(|label| words::label(&self.state.label_book, *label)).collect();
+        let of_map = Some(self.vehicle.share_of_map(labels));
+        let (shift_m, labels) = (self.state.map.shift_m(), labels.clone());
+        let has =
+            move |point: &TrackPoint| labels.contains(&self.vehicle.label_at(shift_m, point.east_m, point.north_m));
+        let place = format!("over {}", names.join(" or "));
+        (!names.is_empty()).then(|| Goal { place, is_favoured, of_map, has: Box::new(has) })
+    }
+
+    /// The share of the time in which the vehicle surveyed that it was at each goal, before the order and then.
+    fn surveyed(&self, goals: &[Option<Goal<'_>>]) -> String {
+        let modes: Vec<(f64, bool)> = (self.dive.modes(self.state, self.vehicle))
             .map(|(at_s, event)| (at_s, event.text.split(": ").next() == Some(VehicleMode::Survey.name())))
             .collect();
         // A surface alone does not know the first mode.
         let surveys =
             |at_s: f64| modes.iter().rev().find(|(since_s, _)| *since_s <= at_s).is_none_or(|(_, surveys)| *surveys);
-        let there = |point: &TrackPoint| aim.holds(state, vehicle, point);
-        let any = |_: f64| true;
-        let first = |stay: Stay| stay.first_s.map(|at_s| self.lasted((at_s - from_s).max(0.0)));
-        Some(match aim {
-            Aim::Classes(_) | Aim::Areas(_) => {
-                let stay = vehicle.stay((from_s, to_s), surveys, there);
-                let before = vehicle.stay((f64::NEG_INFINITY, from_s), surveys, there);
-                let where_ = match aim {
-                    Aim::Classes(classes) => {
-                        let named = classes.iter().map(|class| words::label(&state.label_book, *class));
-                        format!("over {}", named.collect::<Vec<_>>().join(" or "))
-                    }
-                    _ => "in them".to_owned(),
-                };
-                if stay.all_s <= 0.0 {
-                    return Some("it did not survey meanwhile, as far as its places tell".to_owned());
-                }
-                let before = (before.all_s > 0.0).then(|| format!("; before the order, for {}", before.percent()));
-                let first =
-                    first(stay).map_or_else(String::new, |after| format!(", first {after} after it was applied"));
-                let of_map = match aim {
-                    Aim::Classes(classes) => format!("; {} of the map at the end", share_of_map(vehicle, classes)),
-                    _ => String::new(),
-                };
+        let told = goals.iter().flatten().map(|goal| {
+            let [stay, before] = [self.span_s, (f64::NEG_INFINITY, self.span_s.0)]
+                .map(|span_s| self.vehicle.stay(span_s, surveys, &goal.has));
+            if stay.all_s <= 0.0 {
+                return "it did not survey meanwhile, as far as its places tell".to_owned();
+            }
+            let wish = if goal.is_favoured { "favoured" } else { "to be avoided" };
+            let first = stay.first_s.filter(|_| goal.is_favoured);
+            let first =
+                first.map_or_else(String::new, |at_s| format!(", first {} after it was applied", self.since(at_s)));
+            let before = (before.all_s > 0.0).then(|| format!("before the order: {}", before.percent()));
+            let of_map = goal.of_map.as_ref().map(|share| format!("of the map at the end: {share}"));
+            let beside: Vec<String> = before.into_iter().chain(of_map).collect();
+            let beside = if beside.is_empty() { String::new() } else { format!(" ({})", beside.join("; ")) };
+            format!("{}, {wish}: {} of the time in which it surveyed{beside}{first}", goal.place, stay.percent())
+        });
+        let mut told: Vec<String> = told.collect();
+        told.dedup();
+        told.join("; ")
+    }
+
+    /// The time from the beginning to a moment.
+    fn since(&self, at_s: f64) -> String {
+        self.dive.lasted((at_s - self.span_s.0).max(0.0))
+    }
+
+    /// The places of the time.
+    fn places(&self) -> impl Iterator<Item = &TrackPoint> {
+        let (from_s, to_s) = self.span_s;
+        self.vehicle.path().iter().filter(move |point| (from_s..=to_s).contains(&point.at_s))
+    }
+
+    /// Whether it arrived at a place, which ends the order.
+    fn arrival(&self, [east_m, north_m]: [f64; 2]) -> Option<(String, f64)> {
+        let away = |point: &TrackPoint| (point.east_m - east_m).hypot(point.north_m - north_m);
+        let nearest_m = self.places().map(away).reduce(f64::min)?;
+        let arrived_s = self.vehicle.stay(self.span_s, |_| true, |point| away(point) <= ARRIVED_M).first_s;
+        Some(match arrived_s {
+            Some(at_s) => (
                 format!(
-                    "{where_} for {} of the time in which it surveyed{first}{}{of_map}",
-                    stay.percent(),
-                    before.unwrap_or_default()
-                )
-            }
-            Aim::Place([east_m, north_m]) => {
-                let away = |point: &TrackPoint| (point.east_m - east_m).hypot(point.north_m - north_m);
-                let meanwhile = vehicle.path().iter().filter(|point| (from_s..=to_s).contains(&point.at_s));
-                let nearest_m = meanwhile.map(away).reduce(f64::min)?;
-                let stay = vehicle.stay((from_s, to_s), any, there);
-                let arrived = first(stay).map_or_else(
-                    || "it did not arrive".to_owned(),
-                    |after| format!("it arrived (to {ARRIVED_M} m) {after} after the order was applied"),
-                );
-                format!("{arrived}; at the nearest it was {nearest_m:.1} m away")
-            }
-            Aim::Fence(_) => {
-                let stay = vehicle.stay((from_s, to_s), any, there);
-                let out_s = stay.all_s - stay.there_s;
-                match stay.all_s > 0.0 {
-                    false => return None,
-                    true if out_s <= 0.0 => "where it allows, all the time".to_owned(),
-                    true => format!("where it does not allow, for {} in all", self.lasted(out_s)),
-                }
-            }
+                    "it arrived (to {ARRIVED_M} m) {} after the order was applied, which ended it",
+                    self.since(at_s)
+                ),
+                at_s,
+            ),
+            None => (format!("it did not arrive; at the nearest it was {nearest_m:.1} m away"), self.span_s.1),
         })
+    }
+
+    fn fenced(&self, fence: &Fence) -> Option<String> {
+        let allows = |point: &TrackPoint| {
+            fence.fence.as_ref().is_none_or(|fence| is_in(point, fence))
+                && !fence.keep_outs.iter().any(|area| is_in(point, area))
+        };
+        let stay = self.vehicle.stay(self.span_s, |_| true, allows);
+        let out_s = stay.all_s - stay.there_s;
+        (stay.all_s > 0.0).then(|| match out_s < 0.05 {
+            true => "where it allows, all the time".to_owned(),
+            false => format!("where it does not allow, for {} in all", self.dive.lasted(out_s)),
+        })
+    }
+
+    fn held(&self) -> Option<String> {
+        let first = self.places().next()?;
+        let farthest_m = self.places().map(|point| first.distance_m(point)).fold(0.0, f64::max);
+        let (east, north) = (words::east(first.east_m), words::north(first.north_m));
+        Some(format!("at {east}, {north}, at most {farthest_m:.1} m from there"))
     }
 }
 
-/// The share of the cells of a map that such classes have.
-fn share_of_map(vehicle: &DiveVehicle, classes: &BTreeSet<u8>) -> String {
-    let cells = |is_it: &dyn Fn(u8) -> bool| -> u64 {
-        vehicle.classes.iter().filter(|class| is_it(class.label)).map(|class| class.cells).sum()
-    };
-    let (theirs, all) = (cells(&|label| classes.contains(&label)), cells(&|_| true).max(1));
-    format!("{:.0} %", theirs as f64 / all as f64 * 100.0)
+fn areas(areas: &[Polygon], is_favoured: bool) -> Option<Goal<'_>> {
+    let weight = if is_favoured { "positive" } else { "negative" };
+    let place = format!("in the {} of {weight} weight", if areas.len() == 1 { "area" } else { "areas" });
+    let has = Box::new(move |point: &TrackPoint| areas.iter().any(|area| is_in(point, area)));
+    (!areas.is_empty()).then_some(Goal { place, is_favoured, of_map: None, has })
 }
 
 #[cfg(test)]
@@ -257,74 +327,64 @@ mod tests {
     use scenecast_messages::scenecast_msgs::Order;
     use scenecast_protocol::map::Cell;
 
-    /// A vehicle that goes a metre a second to the east, over label 1 for ten seconds and over label 2 then.
-    fn dive(orders: &[(&str, i64, &str)]) -> (Dive, DiveVehicle) {
-        let place = |n: u32| TrackPoint {
-            at_s: f64::from(n),
-            east_m: f64::from(n) + 0.5,
-            north_m: 0.5,
-            depth_m: 5.0,
-            sigma_m: 0.1,
-        };
-        let mut vehicle = DiveVehicle {
-            cell_m: 1.0,
-            mission_speed: 1.0,
-            track: (0..=20).map(place).collect(),
-            ..DiveVehicle::default()
-        };
+    /// What is told of a vehicle that goes a metre a second to the east, over label 1 for ten seconds and over label 2 then.
+    fn told(orders: &[(&str, i64, &str)]) -> String {
+        let place =
+            |n: u32| TrackPoint { at_s: f64::from(n), east_m: f64::from(n), north_m: 0.5, depth_m: 5.0, sigma_m: 0.1 };
+        let track = (0..=20).step_by(5).map(place).collect();
+        let mut vehicle = DiveVehicle { cell_m: 1.0, mission_speed: 1.0, track, ..DiveVehicle::default() };
         for x in 0..20 {
             vehicle.labels.set(Cell::new(x, 0), 1 + u8::from(x >= 10));
         }
         for (version, (slot, at_s, content)) in (1..).zip(orders) {
             let (slot, content) = ((*slot).to_owned(), (*content).to_owned());
-            let mut status = scenecast_messages::scenecast_msgs::OrderStatus {
-                slot: slot.clone(),
-                version,
-                status: OrderStatus::APPLIED,
-                ..OrderStatus::default()
-            };
+            let applied = OrderStatus::APPLIED;
+            let mut status = OrderStatus { slot: slot.clone(), version, status: applied, ..OrderStatus::default() };
             status.header.stamp = Time::from_nanos(at_s * 1_000_000_000);
             vehicle.take_order(&status);
             vehicle.given.insert((slot.clone(), version), Order { slot, version, content, ..Order::default() });
         }
-        let mut dive = Dive::default();
+        let (mut dive, mut page) = (Dive::default(), String::new());
         dive.state.mission.speed = 1.0;
-        (dive, vehicle)
-    }
-
-    fn told(orders: &[(&str, i64, &str)]) -> String {
-        let (dive, vehicle) = dive(orders);
-        let mut page = String::new();
         dive.effects_table(&mut page, &VehicleState::default(), &vehicle);
         page
     }
 
     #[test]
-    fn weights_are_told_by_the_time_over_the_labels_that_they_favour() {
+    fn weights_are_told_by_the_time_over_each_kind_of_label() {
         let page = told(&[("utility", 5, r#"{"weights": {"2": 0.5, "1": -0.5}}"#)]);
-        assert!(
-            page.contains("over label 2 for 67 % of the time in which it surveyed, first 5 s after it was applied; before the order, for 0 %"),
-            "{page}"
-        );
-        assert_eq!(told(&[("utility", 5, r#"{"weights": {"1": -0.5}}"#)]), "", "it favours no label");
+        let favoured = "over label 2, favoured: 67 % of the time in which it surveyed (before the order: 0 %; of the map at the end: 50 %), \
+                        first 5 s after it was applied; over label 1, to be avoided: 33 % of the time in which it surveyed (before the order: 100 %; ";
+        assert!(page.contains(favoured), "{page}");
+        assert_eq!(told(&[("utility", 5, r#"{"exploration": 0.5}"#)]), "", "it favours no label");
     }
 
     #[test]
-    fn a_place_is_told_by_the_arrival_there() {
-        let page = told(&[("destination", 2, r#"{"place": [14.5, 0.5]}"#), ("destination", 16, r#"{"place": null}"#)]);
-        assert!(
-            page.contains("it arrived (to 3 m) 9 s after the order was applied; at the nearest it was 0.0 m away"),
-            "{page}"
-        );
-        let page = told(&[("destination", 2, r#"{"place": [14.5, 9]}"#)]);
+    fn areas_are_told_apart_by_their_weights() {
+        let area = |west: u32, weight: f64| {
+            let east = west + 5;
+            format!(r#"{{"outline": [[{west}, -1], [{east}, -1], [{east}, 2], [{west}, 2]], "weight": {weight}}}"#)
+        };
+        let page = told(&[("areas", 10, &format!(r#"{{"areas": [{}, {}]}}"#, area(15, 0.8), area(0, -0.7)))]);
+        assert!(page.contains("in the area of positive weight, favoured: 50 % of"), "{page}");
+        assert!(page.contains("in the area of negative weight, to be avoided: 0 % of the time in which it surveyed (before the order: 50 %)"));
+    }
+
+    #[test]
+    fn a_place_is_told_by_the_arrival_there_which_ends_the_order() {
+        let page = told(&[("destination", 2, r#"{"place": [14.5, 0.5]}"#)]);
+        assert!(page.contains("00:00:11Z</td><td>it arrived (to 3 m) 10 s after the order was applied"), "{page}");
+        let page = told(&[("destination", 2, r#"{"place": [15, 9]}"#)]);
         assert!(page.contains("it did not arrive; at the nearest it was 8.5 m away"), "{page}");
     }
 
     #[test]
-    fn a_fence_is_told_by_the_time_outside_of_it() {
+    fn a_fence_is_told_by_the_time_outside_of_it_and_a_hold_by_its_place() {
         let fence = |east_m: u32| format!(r#"{{"fence": [[-1, -1], [{east_m}, -1], [{east_m}, 2], [-1, 2]]}}"#);
         assert!(told(&[("fence", 0, &fence(30))]).contains("where it allows, all the time"));
         let page = told(&[("fence", 0, &fence(16))]);
         assert!(page.contains("where it does not allow, for 4 s in all"), "{page}");
+        let page = told(&[("constraints", 10, r#"{"hold": true, "abort": false}"#)]);
+        assert!(page.contains("at 10.0 m east, 0.5 m north, at most 10.0 m from there"), "{page}");
     }
 }

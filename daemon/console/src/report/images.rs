@@ -8,6 +8,7 @@ use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Exemplar;
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::state::VehicleState;
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -86,61 +87,54 @@ fn images_of<'a>(
     vehicle.exemplars.iter().filter(move |(_, exemplar)| state.label_book.shown_as(exemplar.label) == class)
 }
 
-/// When images of a label were newly asked for, but for larger versions, and from when on the vehicle may have sent one because of that.
-fn asked_s(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, label: u8) -> Vec<(f64, f64)> {
+/// When images of a label were newly asked for, seconds since 1970.
+fn asked_s(vehicle: &DiveVehicle, label: u8) -> Vec<f64> {
     let mut asked_s = Vec::new();
     let mut was_asked = false;
     for (order, given) in vehicle.given.iter().filter(|((slot, _), _)| slot == SlotId::Requests.name()) {
         let is_asked = vehicle.labels_of_images(order).is_some_and(|labels| labels.contains(&label.into()));
-        let given_s = unix_s(&given.header.stamp);
-        let known_s = vehicle.own.decided_s.get(order).copied().unwrap_or(given_s);
-        let is_new = is_asked && !was_asked && !dive.is_of_larger(state, given);
-        asked_s.extend(is_new.then_some((given_s, known_s)));
+        asked_s.extend((is_asked && !was_asked).then(|| unix_s(&given.header.stamp)));
         was_asked = is_asked;
     }
     asked_s
 }
 
 /// When an image was asked for, taken and received; nobody asked for most.
-fn times(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, at_s: f64, exemplar: &Exemplar) -> String {
+fn times(vehicle: &DiveVehicle, at_s: f64, exemplar: &Exemplar) -> String {
     let taken = match words::taken(exemplar) {
         Some(taken) => format!("taken {taken}"),
         None => "when it was taken is not known, as that was in an earlier run of the vehicle's program, or more than 4 h before it was sent"
             .to_owned(),
     };
-    let is_first_after = |from_s: f64| {
-        let mut earlier = vehicle.exemplars.iter().filter(|(_, other)| other.label == exemplar.label);
-        from_s <= at_s && !earlier.any(|(other_s, _)| (from_s..at_s).contains(other_s))
-    };
-    let asked_s =
-        asked_s(dive, state, vehicle, exemplar.label).into_iter().filter(|(_, from_s)| is_first_after(*from_s));
-    let asked = asked_s
-        .map(|(given_s, _)| given_s)
-        .reduce(f64::max)
-        .map_or_else(String::new, |s| format!("asked for {}, ", utc_text(s)));
+    let asked_s = asked_s(vehicle, exemplar.label).into_iter().filter(|given_s| exemplar.requested && *given_s <= at_s);
+    let asked = asked_s.reduce(f64::max).map_or_else(String::new, |s| format!("asked for {}, ", utc_text(s)));
     format!("{asked}{taken}, received {}", utc_text(at_s))
 }
 
-/// The largest images of a class, each with its label, time, place and scale.
+/// Images of a class, those that people asked for and the largest first, each with its label, time, place and scale.
 fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
     // The label of a place may have changed since its image was sent.
     let shows_it = |exemplar: &Exemplar| vehicle.shows_class(state, exemplar);
     let of_it: Vec<_> = images_of(state, vehicle, class).collect();
     let mut found: Vec<_> = of_it.iter().copied().filter(|(_, exemplar)| shows_it(exemplar)).collect();
-    found.sort_by_key(|(_, exemplar)| std::cmp::Reverse(exemplar.data.len()));
+    found.sort_by_key(|(_, exemplar)| Reverse((exemplar.requested, exemplar.data.len())));
     // Beside them those that the vehicle sent for the class.
     found.extend(of_it.iter().copied().filter(|(_, exemplar)| !shows_it(exemplar)));
+    found.sort_by_key(|(_, exemplar)| !exemplar.requested);
     let note = |exemplar: &Exemplar| match shows_it(exemplar) {
         true => String::new(),
         false => "; by the map at the end its place has another class".to_owned(),
     };
     let more = found.len().saturating_sub(IMAGES);
-    let more = if more == 0 { String::new() } else { format!("; {more} more of this class came in") };
+    let more = if more == 0 { String::new() } else { format!("; beside these, {more} more of this class came in") };
     found.truncate(IMAGES);
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let shown = found.iter().enumerate();
     shown
-        .map(|(n, found)| image(dive, state, vehicle, found, &(note(&found.1) + if n == 0 { &more } else { "" })))
+        .clone()
+        .map(|(n, found)| {
+            image(dive, state, vehicle, found, &(note(&found.1) + if n + 1 == shown.len() { &more } else { "" }))
+        })
         .collect()
 }
 
@@ -153,7 +147,7 @@ fn image(
     note: &str,
 ) -> String {
     let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
-    let times = times(dive, state, vehicle, *at_s, exemplar);
+    let times = times(vehicle, *at_s, exemplar);
     let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
     let class = state.label_book.shown_as(exemplar.label);
     let own = words::label(&state.label_book, exemplar.label);
@@ -190,6 +184,7 @@ mod tests {
             (at_s, Exemplar { label: 1, taken: Time::from_nanos(taken_s * 1_000_000_000), ..Exemplar::default() })
         };
         vehicle.exemplars = vec![image(20.0, 7), image(40.0, 0), image(50.0, 45)];
+        vehicle.exemplars[1].1.requested = true;
         let mut order = Order {
             content: "{\"labels\": [1]}".to_owned(),
             slot: "requests".to_owned(),
@@ -198,8 +193,7 @@ mod tests {
         };
         order.header.stamp = Time::from_nanos(30_000_000_000);
         vehicle.given.insert(("requests".to_owned(), 1), order);
-        let (dive, state) = (Dive::default(), VehicleState::default());
-        let told = |n: usize| times(&dive, &state, &vehicle, vehicle.exemplars[n].0, &vehicle.exemplars[n].1);
+        let told = |n: usize| times(&vehicle, vehicle.exemplars[n].0, &vehicle.exemplars[n].1);
         assert_eq!(told(0), "taken 1970-01-01T00:00:07Z, received 1970-01-01T00:00:20Z");
         assert!(
             told(1).starts_with("asked for 1970-01-01T00:00:30Z, when it was taken is not known, as"),

@@ -4,7 +4,7 @@ use super::dive::{Dive, DiveVehicle};
 use super::order_step::{OrderKey, OrderStep};
 use super::{Escaped, unix_s, words};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::{Order, OrderStatus};
+use scenecast_messages::scenecast_msgs::{Exemplar, Order, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::state::VehicleState;
 use serde_json::Value;
@@ -48,6 +48,15 @@ impl DiveVehicle {
         self.own.decided_s.insert(order, decision.at_s);
         let Some(last) = way.last().filter(|last| !last.is_end()) else { return };
         way.push(OrderStep { given_s: last.given_s, ..decision });
+    }
+
+    /// When the images that an order asks for came in, in a clause; empty if none did, or it asks for none.
+    fn images_received(&self, order: &OrderKey, given_s: f64) -> String {
+        let labels = self.labels_of_images(order).unwrap_or_default();
+        let is_asked = |image: &Exemplar| image.requested && labels.contains(&image.label.into());
+        let mut arrived = self.exemplars.iter().filter(|(at_s, image)| *at_s >= given_s && is_asked(image));
+        let first = arrived.next().map(|(at_s, _)| format!("; image received {}", utc_text(*at_s)));
+        first.unwrap_or_default()
     }
 
     /// Why an order that has no end has none, as far as a later one of its kind tells it.
@@ -139,7 +148,9 @@ impl Dive {
         let by = match (given.principal.is_empty(), by.is_empty()) {
             (false, _) => given.principal.clone(),
             (true, true) if self.settings.is_rehearsal() => "the script of the rehearsal".to_owned(),
-            (true, _) => by,
+            // It asks a vehicle that was restarted again for what is awaited.
+            (true, true) => "the surface itself".to_owned(),
+            (true, false) => by,
         };
         (words::author(&by).to_owned(), words)
     }
@@ -169,6 +180,7 @@ impl Dive {
                 .map(|at_s| at_s.map_or_else(|| "not known".to_owned(), |at_s| after(self, last.given_s, at_s)));
             let end = vehicle.overtaken(order).filter(|_| !last.is_end());
             let end = end.map_or_else(|| last.told(), |by| format!("{}; {by}", last.told()));
+            let end = end + &vehicle.images_received(order, last.given_s);
             let _ = writeln!(
                 page,
                 "<tr><td>{}</td><td class=\"o\">{}</td><td>{}</td><td class=\"t\">{}</td><td>{}</td><td>{on_board}</td><td>{known}</td></tr>",

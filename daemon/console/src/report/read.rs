@@ -64,6 +64,10 @@ impl Dive {
             state.link.down = sum(&state.link.down, &down);
         }
         let (first, last) = recording.timeline.span;
+        // Where the clock is not the mission's, that of the whole record tells more than the last state.
+        if is_scaled(state.mission.speed) {
+            state.mission.speed = recording.timeline.clock.mean_speed().unwrap_or(state.mission.speed);
+        }
         let mission_speed = state.mission.speed;
         let mut vehicles = BTreeMap::new();
         for vehicle in &state.vehicles {
@@ -143,8 +147,11 @@ impl DiveVehicle {
             let arrived = (seconds(if received == 0 { *at } else { received }), exemplar.clone());
             let number = |of: &Exemplar| (of.label, of.image);
             match vehicle.exemplars.iter_mut().find(|(_, other)| number(other) == number(exemplar)) {
-                // A larger one takes the place of a smaller one. A surface that was restarted has recorded again what it knew.
-                Some(known) if known.1.data.len() < exemplar.data.len() => *known = arrived,
+                // A larger one takes the place of a smaller one, and the same one when somebody asked for it. A surface that was
+                // restarted has recorded again what it knew.
+                Some(known) if known.1.data.len() < exemplar.data.len() || exemplar.requested && !known.1.requested => {
+                    *known = arrived;
+                }
                 Some(_) => {}
                 None => vehicle.exemplars.push(arrived),
             }

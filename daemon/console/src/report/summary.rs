@@ -10,7 +10,6 @@ use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
-use scenecast_surface::LogKind;
 use scenecast_surface::state::VehicleState;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -113,7 +112,7 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     let (begin, end) = dive.span_s;
     let speed = match dive.is_scaled() {
         true => format!(
-            ", as it was played {} times as fast as real time: times are those of the clock, with those of the mission in brackets, and speeds and \
+            ", as it was played {:.1} times as fast as real time: times are those of the clock, with those of the mission in brackets, and speeds and \
              rates are those of the mission",
             dive.state.mission.speed
         ),
@@ -284,14 +283,12 @@ fn orders(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
     }
 }
 
-/// The orders that the surface refused itself.
+/// How many requests the surface refused itself.
 fn not_sent(dive: &Dive, state: &VehicleState) -> String {
-    let is_of_it = |event: &Event| event.vehicle == state.name || event.vehicle.is_empty();
-    let refused = |(_, event): &&(f64, Event)| event.source == LogKind::Refused.name() && is_of_it(event);
-    match dive.events.iter().filter(refused).count() {
+    match dive.not_sent(state).count() {
         0 => String::new(),
         n => format!(
-            " The surface refused {} of people and did not send {}: see the events.",
+            " The surface refused {} of people and did not send {}: see what went wrong.",
             counted(n, "request", "requests"),
             if n == 1 { "it" } else { "them" }
         ),

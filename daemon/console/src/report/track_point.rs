@@ -41,6 +41,17 @@ impl TrackPoint {
         (other.east_m - self.east_m).hypot(other.north_m - self.north_m)
     }
 
+    /// The place and the time a part of the way to another one.
+    pub(super) fn towards(&self, other: &Self, part: f64) -> Self {
+        let between = |from: f64, to: f64| from + (to - from) * part;
+        Self {
+            at_s: between(self.at_s, other.at_s),
+            east_m: between(self.east_m, other.east_m),
+            north_m: between(self.north_m, other.north_m),
+            ..*self
+        }
+    }
+
     pub(super) fn is_known(&self) -> bool {
         [self.east_m, self.north_m].iter().all(|m| m.is_finite())
     }

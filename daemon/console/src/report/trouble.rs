@@ -46,10 +46,22 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         restart("the vehicle's", pause, told_of(set_back) + &uncertainty::lost(vehicle, pause))
     }));
     found.extend(gaps::told(dive, vehicle));
+    found.extend(dive.not_sent(state).map(|event| {
+        let (at_s, told) = told(event);
+        (at_s, format!("the surface refused a request: {told}"))
+    }));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     match found.is_empty() {
         true => vec!["No fault, no restart and no silence was reported.".to_owned()],
         false => listed(&found),
+    }
+}
+
+impl Dive {
+    /// The requests of people that the surface refused and did not send.
+    pub(super) fn not_sent(&self, state: &VehicleState) -> impl Iterator<Item = &(f64, Event)> {
+        let is_of_it = |event: &Event| event.vehicle == state.name || event.vehicle.is_empty();
+        self.events.iter().filter(move |(_, event)| event.source == LogKind::Refused.name() && is_of_it(event))
     }
 }
 

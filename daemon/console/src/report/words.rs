@@ -64,7 +64,7 @@ pub(super) fn kind(source: &str) -> &str {
 /// Who gave an order or made an entry of the log.
 pub(super) fn author(name: &str) -> &str {
     // The page without tokens, and `ctl` beside it.
-    if name == "local" { "the user of the surface's computer" } else { name }
+    if name == "local" { "the local user" } else { name }
 }
 
 /// The labels that are shown as a class: those with cells, and those that were merged into it.
@@ -104,7 +104,7 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
         (": order", ": by order"),
         (NO_ORDER, ": it waited for an order to resume"),
         ("holding", ": it had reached the end of its plan"),
-        ("done", ": the time of its survey was over"),
+        ("done", ": its survey had ended"),
     ];
     let in_words = |(short, long): &(&str, &str)| match text.strip_suffix(short)? {
         "" => Some(format!("{short}{long}")),
@@ -200,6 +200,9 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             let corners = |area: &Value| area["outline"].as_array().map(|corners| outline(corners)).unwrap_or_default();
             let told = |area: &Value| format!("weight {} ({})", value_in_words(&area["weight"]), corners(area));
             let all: Vec<String> = areas.iter().map(told).collect();
+            if all.is_empty() {
+                return Some("no area, so that what was ordered before ends".to_owned());
+            }
             Some(format!("{}: {}", counted(areas.len(), "area", "areas"), all.join("; ")))
         }
         ("background", Value::Array(streams)) => Some(format!(
@@ -210,6 +213,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
                 .map(|stream| match stream {
                     "finer" => "the cells between those of a coarse map",
                     "exemplars" => "images of labels",
+                    "floor" => "images of the sea floor",
                     layer => layer,
                 })
                 .collect::<Vec<_>>()

@@ -269,6 +269,17 @@ impl MissionClock {
         self.states.get(self.next(nanos).saturating_sub(1)).map_or(1.0, |state| state.speed)
     }
 
+    /// Seconds of mission time for each second of the clock over all states, as far as mission time went on; `None` if they do not tell it.
+    pub fn mean_speed(&self) -> Option<f64> {
+        let steps = self.states.iter().zip(self.states.iter().skip(1));
+        let sum = |sum: (f64, f64), (a, b): (&ClockState, &ClockState)| {
+            let (mission_s, clock_s) = (b.now_s - a.now_s, (b.nanos - a.nanos) as f64 / 1e9);
+            if mission_s > 0.0 { (sum.0 + mission_s, sum.1 + clock_s) } else { sum }
+        };
+        let (mission_s, clock_s) = steps.fold((0.0, 0.0), sum);
+        (clock_s > 1.0).then(|| mission_s / clock_s)
+    }
+
     /// The place of the first state after a moment.
     fn next(&self, nanos: u64) -> usize {
         self.states.partition_point(|state| state.nanos <= nanos)

@@ -10,15 +10,15 @@ use scenecast_console::layer_text;
 use scenecast_files::RecordEntry;
 use scenecast_host::FrameEvent;
 use scenecast_messages::Message;
-use scenecast_messages::contents::{Stamps, WORLD_FRAME, header, pose};
+use scenecast_messages::contents::{MAP_FRAME, Stamps, WORLD_FRAME, header, pose};
 use scenecast_messages::geometry_msgs::Point;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar};
-use scenecast_messages::std_msgs::Text;
+use scenecast_messages::std_msgs::{Header, Text};
 use scenecast_protocol::map::{LayerDescriptor, StateReplica};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::messages::{label_tree, link, order, order_status, place, place_on_earth};
 use scenecast_surface::state::{MapLabelTree, MissionState, OrderStatus, VehicleState};
-use scenecast_surface::{LogKind, Snapshot, Surface};
+use scenecast_surface::{LogKind, Snapshot, StoredExemplar, Surface};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -109,8 +109,10 @@ struct RecordedVehicle {
     orders: BTreeMap<String, (u16, OrderStatus)>,
     /// Mission time of the last report.
     report_s: Option<f64>,
-    /// Epoch, label, number and size of the images: a larger one takes the place of one of the same number.
-    exemplars: BTreeSet<(u8, u8, u8, u8)>,
+    /// Epoch, label, number and size of the images, and whether somebody asked for it: a larger one takes the place of one of the same number.
+    exemplars: BTreeSet<(u8, u8, u8, u8, bool)>,
+    /// The number of the last view of the sea floor, and the run that it belongs to.
+    floor: (u32, u64),
 }
 
 /// What a record has of a layer.
@@ -154,6 +156,7 @@ impl SurfaceRecorder {
             recorded.record_tree(seen, &mut entries);
             recorded.record_report(seen, &mut entries);
             recorded.record_exemplars(seen, &mut entries);
+            recorded.record_floor(seen, &mut entries);
             if is_link_due {
                 entries.push(seen.entry("link", &link(&snapshot.state, vehicle, stamps)));
             }
@@ -278,32 +281,53 @@ impl RecordedVehicle {
 
     /// Records the images that have come in, also of labels that have no cell.
     fn record_exemplars(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
-        let Seen { surface, vehicle, stamps, .. } = seen;
-        let Some(record) = seen.address().and_then(|address| surface.record(address)) else { return };
+        let Some(record) = seen.address().and_then(|address| seen.surface.record(address)) else { return };
         let images = record.exemplars.labels().flat_map(|(label, of_it)| of_it.stored.iter().map(move |i| (label, i)));
         for (label, image) in
-            images.filter(|(label, image)| self.exemplars.insert((record.epoch, *label, image.number, image.size)))
+            images.filter(|(label, i)| self.exemplars.insert((record.epoch, *label, i.number, i.size, i.requested)))
         {
-            let place = image.place_m(vehicle.map.shift_m());
-            let message = Exemplar {
-                header: header(stamps.at(image.received.as_secs_f64()), ""),
-                vehicle: vehicle.name.clone(),
-                epoch: record.epoch.into(),
-                label,
-                image: image.number,
-                name: record.label_name(label).unwrap_or_default().to_owned(),
-                taken: image.taken.map(|taken| stamps.at(taken.as_secs_f64())).unwrap_or_default(),
-                width_m: image.width_m().unwrap_or(f64::NAN),
-                middle: place.map_or(Point { x: f64::NAN, y: f64::NAN, z: f64::NAN }, |(x, y)| Point {
-                    x,
-                    y,
-                    z: f64::NAN,
-                }),
-                format: "webp".to_owned(),
-                data: image.webp.clone(),
-            };
+            let name = record.label_name(label).unwrap_or_default();
+            let message = Exemplar { epoch: record.epoch.into(), label, name: name.to_owned(), ..picture(seen, image) };
             entries.push(seen.entry("exemplars", &message));
         }
+    }
+
+    /// Records the views of the sea floor that have come in, as images of no label.
+    fn record_floor(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
+        let Some(record) = seen.address().and_then(|address| seen.surface.record(address)) else { return };
+        let last = if self.floor.0 == record.run { self.floor.1 } else { 0 };
+        let news = record.floor.iter().filter(|(_, number, _)| *number > last);
+        let mut news: Vec<_> = news.map(|(_, number, view)| (number, view)).collect();
+        news.sort_by_key(|(number, _)| *number);
+        entries.extend(news.into_iter().map(|(_, view)| seen.entry("floor", &of_floor(seen, view))));
+        self.floor = (record.run, record.floor.version());
+    }
+}
+
+/// A view of the sea floor, which moves with the map.
+fn of_floor(seen: Seen<'_>, view: &StoredExemplar) -> Exemplar {
+    let ((x, y), whole) = (view.view.middle_m(), picture(seen, view));
+    Exemplar {
+        header: Header { frame_id: MAP_FRAME.to_owned(), ..whole.header.clone() },
+        middle: Point { x, y, z: f64::NAN },
+        ..whole
+    }
+}
+
+/// An image that has come in.
+fn picture(Seen { vehicle, stamps, .. }: Seen<'_>, image: &StoredExemplar) -> Exemplar {
+    let place = image.place_m(vehicle.map.shift_m());
+    Exemplar {
+        header: header(stamps.at(image.received.as_secs_f64()), ""),
+        vehicle: vehicle.name.clone(),
+        image: image.number,
+        taken: image.taken.map(|taken| stamps.at(taken.as_secs_f64())).unwrap_or_default(),
+        width_m: image.width_m().unwrap_or(f64::NAN),
+        middle: place.map_or(Point { x: f64::NAN, y: f64::NAN, z: f64::NAN }, |(x, y)| Point { x, y, z: f64::NAN }),
+        requested: image.requested,
+        format: "webp".to_owned(),
+        data: image.webp.clone(),
+        ..Exemplar::default()
     }
 }
 

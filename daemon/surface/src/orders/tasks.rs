@@ -89,7 +89,7 @@ pub struct BudgetOrder {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shares: Option<SharesOrder>,
     /// The background streams that use spare capacity, in this order and without repetition: finer (the cells between coarse
-    /// ones), exemplars (images of new labels that nobody requested), names of layers (layers without a share).
+    /// ones), exemplars (images of new labels that nobody requested), floor (images of the sea floor), names of layers (layers without a share).
     /// A stream that is not listed is not sent, except finer cells, which then precede all others. By default as last sent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<Vec<String>>,

@@ -131,6 +131,10 @@ pub enum VehicleEvent {
     Faults(u8),
     /// The last tree of the labels, as on the wire.
     Tree(Vec<u8>),
+    /// A view of the sea floor arrived, which replaces one with the same middle.
+    Floor(StoredImage),
+    /// The view of the sea floor with this middle was dropped.
+    FloorGone((i32, i32)),
 }
 
 /// A run of a vehicle and the epoch of its labels.
@@ -200,7 +204,7 @@ pub struct StoredIntent {
     pub settings_unsure: bool,
 }
 
-/// An image of a label.
+/// An image of a label, or a view of the sea floor, which has no number and is never requested.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredImage {
     pub number: u8,

@@ -34,6 +34,8 @@ pub struct VehicleMemory {
     pub(crate) orders: OrderMemory,
     /// By label, in the order of arrival.
     pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
+    /// By their middle.
+    pub(crate) floor: BTreeMap<(i32, i32), StoredImage>,
     /// Serial number of requests and the open one, by label.
     pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
     pub(crate) annotations: AnnotationMemory,
@@ -144,6 +146,8 @@ impl VehicleMemory {
                     self.exemplars.remove(label);
                 }
             }
+            VehicleEvent::Floor(view) => _ = self.floor.insert(view.middle_dm, view.clone()),
+            VehicleEvent::FloorGone(middle_dm) => _ = self.floor.remove(middle_dm),
             VehicleEvent::Request { label, serial, open } => {
                 match (*serial, *open) {
                     (0, None) => self.requests.remove(label),
@@ -212,6 +216,7 @@ impl VehicleMemory {
         for (&label, images) in &self.exemplars {
             all.extend(images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }));
         }
+        all.extend(self.floor.values().cloned().map(VehicleEvent::Floor));
         all.extend(self.annotations.to_events());
         all
     }

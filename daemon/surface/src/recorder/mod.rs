@@ -8,6 +8,7 @@ mod restore;
 mod stored;
 
 use crate::Surface;
+use crate::exemplar_cache::StoredExemplar;
 use crate::record::{
     Event, EventKind, EventSource, EventTime, RunId, StoredBudget, StoredImage, StoredLogEntry, SurfaceMemory,
     VehicleEvent, VehicleMemory,
@@ -299,6 +300,7 @@ fn contact_changes(
         events.push(VehicleEvent::Faults(faults));
     }
     exemplar_changes(record, memory, events);
+    floor_changes(record, memory, events);
 }
 
 /// The points of a track after the first `known` ones, as far as they are kept; times in microseconds.
@@ -334,6 +336,19 @@ fn exemplar_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut
             events.push(VehicleEvent::Request { label, serial, open });
         }
     }
+}
+
+fn floor_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut Vec<VehicleEvent>) {
+    let gone = memory.floor.keys().filter(|place| record.floor.get(**place).is_none());
+    events.extend(gone.map(|place| VehicleEvent::FloorGone(*place)));
+    let is_kept = |place, view: &StoredExemplar| {
+        memory
+            .floor
+            .get(&place)
+            .is_some_and(|kept| (kept.size, kept.received) == (view.size, view.received.as_micros()))
+    };
+    let news = record.floor.iter().filter(|(place, _, view)| !is_kept(*place, view));
+    events.extend(news.map(|(_, _, view)| VehicleEvent::Floor(stored::image(view))));
 }
 
 fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMemory, events: &mut Vec<VehicleEvent>) {

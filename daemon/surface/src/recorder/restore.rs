@@ -66,6 +66,9 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
         exemplars.restore_request(label, *serial, open.as_ref().map(|open| stored::open_request(label, open)));
     }
     record.exemplars = exemplars;
+    let mut floor: Vec<_> = memory.floor.values().map(stored::exemplar).collect();
+    floor.sort_by_key(|view| view.received);
+    floor.into_iter().for_each(|view| record.floor.insert(view));
     record.annotations.labels.clone_from(&memory.annotations.labels);
     record.labels.tree = memory.tree();
     record.annotations.notes.clone_from(&memory.annotations.notes);

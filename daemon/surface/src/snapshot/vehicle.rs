@@ -4,10 +4,10 @@ use super::facts::MissionFacts;
 use super::{exemplar, facts, link};
 use crate::record::{StoredDraft, StoredMarker, StoredNote};
 use crate::state::{
-    AppliedOrder, DirectiveSlots, EarlierMap, InForceKnowledge, MapLabel, MapLabelTree, MapSummary, OrderProgress,
-    OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedPose, ReportedRegistration,
-    ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote, VehicleOrders,
-    VehicleSettings, VehicleState, WeightDraft, seconds,
+    AppliedOrder, DirectiveSlots, EarlierMap, FloorSummary, InForceKnowledge, MapLabel, MapLabelTree, MapSummary,
+    OrderProgress, OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedPose,
+    ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote,
+    VehicleOrders, VehicleSettings, VehicleState, WeightDraft, seconds,
 };
 use crate::{SettingsOrder, Surface, Track, VehicleRecord, order_name};
 use scenecast_protocol::coordinates::MapPoint;
@@ -45,6 +45,11 @@ fn vehicle(
         labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
         label_book: record.labels_in_view().clone(),
         label_tree: record.tree_in_view().map(MapLabelTree::of),
+        floor: FloorSummary {
+            images: record.floor.count(),
+            bytes: record.floor.bytes(),
+            version: record.floor.version(),
+        },
         link: link::channel(&view, now),
         usbl: record.found.as_ref().map(|(line, at)| UsblMeasurement {
             at_s: seconds(*at) - line.age_s,

@@ -13,7 +13,7 @@ pub struct LinkSummary {
     pub budget_window_s: f64,
     /// The minimum share of each class, percent.
     pub shares: BTreeMap<String, u8>,
-    /// The background streams that use spare capacity, in this order: finer, exemplars and names of layers.
+    /// The background streams that use spare capacity, in this order: finer, exemplars, floor and names of layers.
     #[serde(default)]
     pub background: Vec<String>,
     /// Frames that could not be read or came from an unknown vehicle.

@@ -48,6 +48,9 @@ pub struct VehicleState {
     /// Which of them become one at coarser cuts; null if the vehicle has not sent it.
     #[serde(default)]
     pub label_tree: Option<MapLabelTree>,
+    /// The images of the sea floor itself, which the vehicle sends with spare capacity.
+    #[serde(default)]
+    pub floor: FloorSummary,
     /// Measurements of the channel to this vehicle.
     pub link: VehicleChannel,
     /// The last USBL measurement of the vehicle; null before the first.
@@ -64,6 +67,43 @@ pub struct VehicleState {
     /// The orders to the vehicle.
     #[serde(flatten)]
     pub orders: VehicleOrders,
+}
+
+/// The images of the sea floor without their addresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct FloorSummary {
+    /// How many there are; at most 4096.
+    pub images: usize,
+    /// The bytes of all.
+    pub bytes: usize,
+    /// A number that grows with each image that arrives; it is lower again in another run of the vehicle.
+    pub version: u64,
+}
+
+/// The images of the sea floor that have arrived, or those after a version.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct FloorList {
+    /// The number of the last image.
+    pub version: u64,
+    /// In the order of arrival.
+    pub images: Vec<FloorImage>,
+}
+
+/// A square image of the sea floor, north up. It replaces an earlier one with the same middle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FloorImage {
+    /// Path of the image on this server.
+    pub url: String,
+    /// Its middle on the vehicle's map, metres east.
+    pub x_m: f64,
+    /// Its middle on the vehicle's map, metres north.
+    pub y_m: f64,
+    /// How wide it is on the sea floor, metres.
+    pub width_m: f64,
+    /// Mission time of its arrival, seconds.
+    pub at_s: f64,
+    /// Mission time of the latest camera frame in it, seconds; null where it is not known.
+    pub taken_s: Option<f64>,
 }
 
 /// Another surface with the same key.

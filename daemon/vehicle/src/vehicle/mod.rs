@@ -6,6 +6,7 @@
 mod bands;
 mod durable;
 mod evidence;
+mod floor;
 mod gallery;
 mod guidance;
 mod publisher;
@@ -19,10 +20,12 @@ pub use storing::VehicleDisk;
 
 use super::changes::{MapChanges, SharedExemplars};
 use super::failsafe::FailsafePolicy;
+use super::mosaic::cells_of_tile;
 use super::navigator::Navigator;
 use super::registration::{RegisteredFrame, RegistrationMonitor};
 use super::steering::Steering;
 use super::track::RecentTrack;
+use floor::FloorPictures;
 use gallery::Gallery;
 use guidance::{Guidance, Situation};
 use publisher::MapPublisher;
@@ -79,6 +82,7 @@ pub struct Vehicle {
     guidance: Guidance,
     publisher: MapPublisher,
     gallery: Gallery,
+    floor: FloorPictures,
     durable: Durable,
     storing: Storing,
     weights: Weights,
@@ -109,6 +113,7 @@ impl Vehicle {
             guidance: Guidance::new(steering, policy, &durable, &settings, now),
             publisher: MapPublisher::default(),
             gallery: Gallery::default(),
+            floor: FloorPictures::default(),
             // The weights are those of labels of their epoch; a new epoch has no labels yet.
             weights: Weights::new(
                 durable.utility.order().filter(|u| u.epoch == durable.epoch),
@@ -222,6 +227,7 @@ impl Vehicle {
     /// A producer has changed the map. New labels are stored before any of them is sent, so that a restart cannot give one
     /// another meaning. Returns the label whose name is refused, because it has another one already.
     pub fn handle_changes(&mut self, changes: &MapChanges, now: Instant) -> Option<u8> {
+        self.floor.add(&changes.floor);
         let is_more = changes.labels.as_ref().is_some_and(|labels| self.durable.claim(labels));
         if !self.storing.holds_changes(changes, now) {
             self.publish(changes, now);
@@ -255,6 +261,7 @@ impl Vehicle {
         self.publisher.begin_epoch(&mut self.link, now);
         self.weights = Weights::default();
         self.gallery = Gallery::default();
+        self.floor.handle_restart(&mut self.link);
         self.follow_utility();
         self.report_in_force(now);
     }
@@ -269,9 +276,12 @@ impl Vehicle {
     }
 
     fn serve_exemplars(&mut self, now: Instant) {
-        let Self { weights, gallery, link, storing, publisher, .. } = self;
+        let Self { weights, gallery, floor, link, storing, publisher, .. } = self;
         gallery.set_frames(publisher.frames());
         gallery.serve(storing.epoch(), |label| weights.weight(label), link, now);
+        let map = publisher.seen().0;
+        let weight = |at| cells_of_tile(at).map(|cell| weights.weight(map.get(cell))).sum();
+        floor.serve(weight, &publisher.frames(), link, now);
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
@@ -284,6 +294,7 @@ impl Vehicle {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
                 VehicleEvent::ObjectDelivered(id) => {
                     self.gallery.handle_delivered(id);
+                    self.floor.handle_delivered(id);
                     self.serve_exemplars(now);
                 }
                 VehicleEvent::SurfaceMet => self.handle_meeting(),
@@ -321,6 +332,7 @@ impl Vehicle {
     /// Everything that was in flight is lost.
     fn handle_surface_restart(&mut self, now: Instant) {
         self.gallery.handle_restart(&mut self.link);
+        self.floor.handle_restart(&mut self.link);
         self.link.cancel_objects();
         self.serve_exemplars(now);
     }

@@ -87,7 +87,8 @@ impl<S: StateSource> VehicleContent<S> {
 
     /// The background streams that wait and may be sent now. There is spare capacity while less than half of the
     /// budget's window was used, so that urgent content that comes up next finds room. While finer cells wait, the
-    /// streams that the operator lists before them may be sent too. Exemplars of labels of which the surface has one come last.
+    /// streams that the operator lists before them may be sent too. Exemplars of labels of which the surface has one, and the
+    /// floor, come last.
     pub(super) fn background_streams(
         &self,
         budget: &BitBudget,
@@ -96,7 +97,8 @@ impl<S: StateSource> VehicleContent<S> {
         let (spare, refining) = (budget.is_plentiful(now), self.is_refining());
         let finer = self.background.iter().position(|s| s == BackgroundStream::Finer).filter(|_| refining);
         let allowed = move |place: usize| spare || finer.is_some_and(|finer| place <= finer);
-        let is_last = |stream| stream == BackgroundStream::Exemplars && self.objects.has_only_last();
+        let are_objects = |stream| matches!(stream, BackgroundStream::Exemplars | BackgroundStream::Floor);
+        let is_last = move |stream| are_objects(stream) && self.objects.has_only_last();
         let waits =
             move |&(place, stream): &(usize, BackgroundStream)| allowed(place) && self.waiting_bytes(stream) > 0;
         let in_order = move |last: bool| self.background.iter().enumerate().filter(move |&(_, s)| is_last(s) == last);
@@ -107,7 +109,9 @@ impl<S: StateSource> VehicleContent<S> {
         match stream {
             BackgroundStream::Finer if self.is_refining() => self.source.backlog_bytes(),
             BackgroundStream::Finer => 0,
-            BackgroundStream::Exemplars => self.objects.background_backlog_bytes(),
+            // One queue has the objects of both, in the place of the exemplars where there are any.
+            BackgroundStream::Floor if self.background.has(BackgroundStream::Exemplars) => 0,
+            BackgroundStream::Exemplars | BackgroundStream::Floor => self.objects.background_backlog_bytes(),
             BackgroundStream::Layer(id) => {
                 let of_stream = |l: &&LayerOut| l.is_selected && !l.has_share() && l.source.id() == id;
                 self.layers.iter().find(of_stream).map_or(0, |l| l.source.backlog_bytes())

@@ -208,6 +208,11 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.objects.push_background(bytes)
     }
 
+    /// Bytes of objects that wait for spare capacity.
+    pub fn background_object_bytes(&self) -> usize {
+        self.content.objects.background_backlog_bytes()
+    }
+
     /// Stops sending every object, requested or not.
     pub fn cancel_objects(&mut self) {
         self.content.objects.cancel_all();

@@ -8,6 +8,7 @@ import { ramp } from "../palette.js";
 import { current as theme, onTheme } from "../theme.js";
 import { EDGE } from "../tiles.js";
 import { blocksOf, hasCoarse } from "./coarse.js";
+import { FLOOR, FloorOver, floorKey, floorLegend, floorTone, hasFloor, loadFloor } from "./floor.js";
 import { lookOf } from "./layer-look.js";
 import { ageTones, footprintTones, labelTones, layerTones, paintTile, sampleTone } from "./raster.js";
 import { NATURAL, NaturalOver, loadLooks, naturalEdits, naturalLegend, naturalTone, withoutImage } from "./natural.js";
@@ -31,7 +32,7 @@ onTheme(() => {
 
 /** The layers that can be shown: those of the chosen vehicle's map, and the true classes of a simulated sea floor. */
 export function layerNames() {
-  return ["label", NATURAL, "age", ...(store.map?.layers.map((p) => p.name).sort() ?? []), ...(truthInfo() ? [TRUTH] : [])];
+  return ["label", NATURAL, ...(hasFloor() ? [FLOOR] : []), "age", ...(store.map?.layers.map((p) => p.name).sort() ?? []), ...(truthInfo() ? [TRUTH] : [])];
 }
 
 /** Changes between the layer `name` and the one that was shown before. */
@@ -67,7 +68,9 @@ export function painterOf(vehicle, map) {
 function currentLook(vehicle, map) {
   const chosen = vehicle.id === store.selectedId;
   const isNatural = chosen && layer.name === NATURAL;
+  const isFloor = chosen && layer.name === FLOOR;
   if (isNatural) loadLooks(vehicle);
+  if (isFloor) loadFloor(vehicle, map);
   const shown = map.layers.find((p) => p.name === layer.name);
   const nowS = layer.name === "age" ? Math.floor(store.nowS / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
   const top = layer.name === "age" ? ageTop(map) : 0;
@@ -79,8 +82,8 @@ function currentLook(vehicle, map) {
   const have = painted.get(vehicle.id);
   if (have?.key === key) return have;
   const look = { key, tones: tonesOf(vehicle, chosen, shown, nowS, top), canvases: new Map() };
-  look.over = isNatural ? new NaturalOver(layer.highlight) : null;
-  look.isCoarse = isNatural || (chosen && layer.name === "label");
+  look.over = isNatural ? new NaturalOver(layer.highlight) : isFloor ? new FloorOver() : null;
+  look.isCoarse = isNatural || isFloor || (chosen && layer.name === "label");
   painted.set(vehicle.id, look);
   return look;
 }
@@ -95,7 +98,8 @@ function forgetReplaced(look, map) {
 }
 
 function tonesOf(vehicle, chosen, shown, nowS, top) {
-  const toneOf = chosen && layer.name === NATURAL ? (id) => naturalTone(vehicle, id) : (id) => [...tintOf(id), 255];
+  const tones = { [NATURAL]: (id) => naturalTone(vehicle, id), [FLOOR]: floorTone };
+  const toneOf = (chosen && tones[layer.name]) || ((id) => [...tintOf(id), 255]);
   const label = labelTones({ toneOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
   if (!chosen) return { label, cell: footprintTones() };
   if (shown) return { label, cell: layerTones(shown, isStale(vehicle)) };
@@ -119,6 +123,13 @@ function drawNaturalLegend() {
   $("legend").replaceChildren(...naturalLegend(missing));
 }
 
+function drawFloorLegend() {
+  if (floorKey() === legendKey) return;
+  legendKey = floorKey();
+  show($("legend"), store.map !== null);
+  $("legend").replaceChildren(...floorLegend());
+}
+
 function drawTruthLegend() {
   const key = JSON.stringify(truthInfo());
   if (key === legendKey) return;
@@ -136,6 +147,7 @@ export function drawLegend() {
   const coarse = layer.name === "label" && Boolean(map) && hasCoarse(map);
   if (layer.name === TRUTH) return drawTruthLegend();
   if (layer.name === NATURAL) return drawNaturalLegend();
+  if (layer.name === FLOOR) return drawFloorLegend();
   const look = shown ? lookOf(shown) : { at: ramp, low: "now", high: span(top) };
   const key = `${layer.name}.${look.low}.${look.high}.${coarse}`;
   if (key === legendKey) return;

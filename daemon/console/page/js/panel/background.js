@@ -4,11 +4,11 @@ import { h, show, text } from "../dom.js";
 import { plain } from "../format.js";
 import { store } from "../store.js";
 
-const NAMES = { finer: "finer cells, while the map is coarse", exemplars: "images of new labels" };
-const HELP = { finer: "Cells between the coarse ones", exemplars: "Images that nobody has requested, one for each new label" };
+const NAMES = { finer: "finer cells, while the map is coarse", exemplars: "images of new labels", floor: "images of the sea floor" };
+const HELP = { finer: "Cells between the coarse ones", exemplars: "Images that nobody has requested, one for each new label", floor: "The sea floor itself, all of it coarse first, then fine" };
 const nameOf = (stream) => NAMES[stream] ?? `layer ${plain(stream)}`;
 const helpOf = (stream) => `${HELP[stream] ?? "Values of this layer of the map"}, sent while nothing else waits`;
-/** Every stream: two of the page, and the layers that the surface lists. */
+/** Every stream: three of the page, and the layers that the surface lists. */
 const streams = () => [...Object.keys(NAMES), ...(store.snapshot?.layers.map((l) => l.name) ?? [])];
 
 /** `value()` returns the streams in order, `change(streams)` sets them. */

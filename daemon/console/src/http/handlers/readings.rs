@@ -47,6 +47,28 @@ pub(in crate::http) async fn exemplar(State(shared): State<Shared>, VehicleId(id
     }
 }
 
+/// The images of the sea floor after the version `since`.
+pub(in crate::http) async fn floor(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Query(query): Query<BTreeMap<String, String>>,
+) -> Response {
+    match query.get("since").map_or(Ok(0), |since| since.parse()) {
+        Ok(since) => shared.respond(SurfaceRequest::Floor(id, since)).await,
+        Err(_) => error(StatusCode::UNPROCESSABLE_ENTITY, "since takes a version: a whole number from 0 on"),
+    }
+}
+
+/// An image of the sea floor by its middle in decimetres, as in `310_-10.webp`.
+pub(in crate::http) async fn floor_image(State(shared): State<Shared>, VehicleId(id): VehicleId, uri: Uri) -> Response {
+    let file = uri.path().rsplit('/').next().unwrap_or_default();
+    let place = file.strip_suffix(".webp").and_then(|place| place.split_once('_'));
+    match place.and_then(|(east, north)| Some((east.parse().ok()?, north.parse().ok()?))) {
+        Some(place) => shared.respond(SurfaceRequest::FloorImage(id, place)).await,
+        None => not_found(),
+    }
+}
+
 /// Settings that fit the budget `bits_per_s`.
 pub(in crate::http) async fn fit(
     State(shared): State<Shared>,

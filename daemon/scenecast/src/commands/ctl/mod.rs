@@ -327,7 +327,7 @@ enum BudgetCommand {
         #[arg(long, value_name = "CLASS=PERCENT,..", value_delimiter = ',', value_parser = class_percent)]
         shares: Vec<(String, u8)>,
         /// Background streams that use spare capacity, in this order: none, or different ones of finer,
-        /// exemplars and the names of layers
+        /// exemplars, floor and the names of layers
         #[arg(long, value_name = "STREAM,..", value_delimiter = ',')]
         background: Option<Vec<String>>,
     },

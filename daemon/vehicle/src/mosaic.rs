@@ -1,0 +1,342 @@
+//! Pictures of the sea floor, tile by tile, put together from camera frames.
+
+use image::{Rgb, RgbImage};
+use scene_model::project::Observation;
+use scene_model::words::Word;
+use scenecast_protocol::map::Cell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Edge of a tile in cells of the map.
+const TILE_CELLS: i32 = 8;
+/// Edge of a tile in pixels.
+pub const TILE_PX: u32 = 128;
+/// Tiles that are kept, 64 kB each; of more, those that were out of view for the longest time are dropped.
+const MAX_TILES: usize = 512;
+/// Tiles that a frame changes at most: one that seems to see more has no sound geometry.
+const MAX_IN_VIEW: i64 = 400;
+/// A tile is given out once it was out of view for this time, seconds; sooner, the next frame would change it.
+const SETTLED_S: f64 = 10.0;
+/// The part of a tile that has to be seen, and that has to be new since it was given out last.
+const LEAST_SEEN: f64 = 0.3;
+const LEAST_NEW: f64 = 0.1;
+/// How much nearer to the middle of its frame a pixel has to be than the one that it replaces, of 255.
+const NEARER: u8 = 12;
+
+/// The column and the row of a tile, east and north of the origin of the map.
+pub type TilePlace = (i32, i32);
+
+/// The cells of the map under a tile.
+pub(super) fn cells_of_tile((column, row): TilePlace) -> impl Iterator<Item = Cell> {
+    let cells = |tile: i32| TILE_CELLS * tile..TILE_CELLS * (tile + 1);
+    cells(row).flat_map(move |y| cells(column).map(move |x| Cell::new(x, y)))
+}
+
+/// A picture of a square of the sea floor, north up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FloorTile {
+    pub at: TilePlace,
+    /// [`TILE_PX`] square. Pixels that no frame has shown have the mean colour of the others.
+    pub picture: Arc<RgbImage>,
+    /// The middle in the map frame, metres east and north.
+    pub middle_m: (f64, f64),
+    pub width_m: f64,
+    /// Mission time of the last frame in it, seconds.
+    pub t_s: f64,
+}
+
+/// A tile in the making.
+#[derive(Debug, Clone)]
+struct Tile {
+    picture: RgbImage,
+    /// How near to the middle of its frame each pixel was, 1 to 255; 0 where no frame has shown it.
+    near: Vec<u8>,
+    seen_s: f64,
+    /// Pixels that were seen when it was given out last, and whether it has changed since then.
+    given: usize,
+    is_changed: bool,
+}
+
+impl Tile {
+    fn new(t_s: f64) -> Self {
+        let pixels = TILE_PX as usize * TILE_PX as usize;
+        Self {
+            picture: RgbImage::new(TILE_PX, TILE_PX),
+            near: vec![0; pixels],
+            seen_s: t_s,
+            given: 0,
+            is_changed: false,
+        }
+    }
+
+    fn seen(&self) -> usize {
+        self.near.iter().filter(|near| **near > 0).count()
+    }
+
+    /// The picture without holes.
+    fn filled(&self) -> RgbImage {
+        let mut sum = [0_u64; 3];
+        let seen = self.seen().max(1) as u64;
+        for (pixel, _) in self.picture.pixels().zip(&self.near).filter(|(_, near)| **near > 0) {
+            (0..3).for_each(|c| sum[c] += u64::from(pixel.0[c]));
+        }
+        let mean = Rgb(sum.map(|sum| (sum / seen) as u8));
+        let mut filled = self.picture.clone();
+        let holes = filled.pixels_mut().zip(&self.near).filter(|(_, near)| **near == 0);
+        holes.for_each(|(pixel, _)| *pixel = mean);
+        filled
+    }
+}
+
+/// How the pixels of a frame lie on the map, about: exact in its middle, where the camera looks straight down.
+struct Lie {
+    /// Middle of the frame, pixels, and its place, metres.
+    middle: (f64, f64),
+    place: (f64, f64),
+    /// Pixels to the right and down for a metre to the east and to the north.
+    to_pixels: [[f64; 2]; 2],
+}
+
+impl Lie {
+    /// `None` if the middle of the frame sees no floor.
+    fn of((width, height): (u32, u32), project: &impl Fn(&[Word]) -> Vec<Observation>) -> Option<Self> {
+        let middle = (f64::from(width) / 2.0, f64::from(height) / 2.0);
+        let step = f64::from(width.min(height)) / 4.0;
+        let word = |id, right: f64, down: f64| Word { id, u: (middle.0 + right) as f32, v: (middle.1 + down) as f32 };
+        let seen = project(&[word(0, 0.0, 0.0), word(1, step, 0.0), word(2, 0.0, step)]);
+        let [at, right, down] = [0, 1, 2].map(|id| seen.iter().find(|seen| seen.word == id));
+        let (at, right, down) = (at?, right?, down?);
+        let [[a, b], [c, d]] = [[right.x - at.x, down.x - at.x], [right.y - at.y, down.y - at.y]];
+        let determinant = a * d - b * c;
+        let by = step / determinant;
+        let to_pixels = [[d * by, -b * by], [-c * by, a * by]];
+        let is_sound = determinant.abs() > 1e-9 && at.x.is_finite() && at.y.is_finite();
+        is_sound.then_some(Self { middle, place: (at.x, at.y), to_pixels })
+    }
+
+    fn pixels(&self, east_m: f64, north_m: f64) -> (f64, f64) {
+        let [[a, b], [c, d]] = self.to_pixels;
+        (a * east_m + b * north_m, c * east_m + d * north_m)
+    }
+
+    fn pixel_of(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        let (right, down) = self.pixels(x - self.place.0, y - self.place.1);
+        (self.middle.0 + right, self.middle.1 + down)
+    }
+
+    /// Metres to the east and to the north that the frame reaches from its middle, about.
+    fn reach_m(&self) -> (f64, f64) {
+        let [[a, b], [c, d]] = self.to_pixels;
+        let determinant = a * d - b * c;
+        let reach =
+            |right: f64, down: f64| (right.abs() * self.middle.0 + down.abs() * self.middle.1) / determinant.abs();
+        (reach(d, b), reach(c, a))
+    }
+}
+
+/// The picture of the sea floor so far.
+#[derive(Debug, Clone, Default)]
+pub struct Mosaic {
+    tiles: BTreeMap<TilePlace, Tile>,
+}
+
+impl Mosaic {
+    /// Adds a frame of mission time `t_s`, of which `project` puts pixels on the map with cells of `cell_m`.
+    pub fn add(&mut self, frame: &RgbImage, project: impl Fn(&[Word]) -> Vec<Observation>, cell_m: f64, t_s: f64) {
+        let Some(lie) = Lie::of(frame.dimensions(), &project) else { return };
+        let edge_m = f64::from(TILE_CELLS) * cell_m;
+        let (east_m, north_m) = lie.reach_m();
+        let span = |at: f64, reach: f64| {
+            let tile = |m: f64| (m / edge_m).floor();
+            (tile(at - reach) as i64, tile(at + reach) as i64)
+        };
+        let (columns, rows) = (span(lie.place.0, east_m), span(lie.place.1, north_m));
+        if (columns.1 - columns.0 + 1).saturating_mul(rows.1 - rows.0 + 1) > MAX_IN_VIEW {
+            return;
+        }
+        for at in
+            (rows.0..=rows.1).flat_map(|row| (columns.0..=columns.1).map(move |column| (column as i32, row as i32)))
+        {
+            self.add_to(at, edge_m, frame, &lie, &project, t_s);
+        }
+    }
+
+    /// Puts the pixels of a frame on a tile that are nearer to the middle than those that the tile has.
+    fn add_to(
+        &mut self,
+        at: TilePlace,
+        edge_m: f64,
+        frame: &RgbImage,
+        lie: &Lie,
+        project: &impl Fn(&[Word]) -> Vec<Observation>,
+        t_s: f64,
+    ) {
+        let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
+        let pitch = edge_m / f64::from(TILE_PX);
+        let (west, north) = (f64::from(at.0) * edge_m, f64::from(at.1 + 1) * edge_m);
+        let place = |index: u32| {
+            let (column, row) = (index % TILE_PX, index / TILE_PX);
+            (west + (f64::from(column) + 0.5) * pitch, north - (f64::from(row) + 0.5) * pitch)
+        };
+        let nearness = |(u, v): (f64, f64)| {
+            let off = ((u / width - 0.5).abs()).max((v / height - 0.5).abs()) * 2.0;
+            (off < 1.0).then(|| (255.0 * (1.0 - off)).max(1.0) as u8)
+        };
+        let kept = self.tiles.get(&at);
+        let is_better = |index: u32, near: u8| {
+            let known = kept.map_or(0, |tile| tile.near[index as usize]);
+            known == 0 || near > known.saturating_add(NEARER)
+        };
+        let wanted = (0..TILE_PX * TILE_PX).filter_map(|id| {
+            let (u, v) = lie.pixel_of(place(id));
+            let near = nearness((u, v))?;
+            is_better(id, near).then_some((Word { id, u: u as f32, v: v as f32 }, near))
+        });
+        let (words, near): (Vec<Word>, Vec<u8>) = wanted.unzip();
+        if words.is_empty() {
+            return;
+        }
+        let box_px = ((lie.pixels(pitch, 0.0).0.hypot(lie.pixels(pitch, 0.0).1)).round() as i64).clamp(1, 8);
+        let tile = self.tiles.entry(at).or_insert_with(|| Tile::new(t_s));
+        // A pixel is where it is in the frame, less what the camera puts it beside its place: the second step of Newton's method.
+        let seen: BTreeMap<u32, Observation> = project(&words).into_iter().map(|seen| (seen.word, seen)).collect();
+        for (word, near) in words.iter().zip(near) {
+            let Some(seen) = seen.get(&word.id) else { continue };
+            let (x, y) = place(word.id);
+            let (right, down) = lie.pixels(x - seen.x, y - seen.y);
+            let (u, v) = (f64::from(word.u) + right, f64::from(word.v) + down);
+            if let Some(colour) = mean_around(frame, (u, v), box_px) {
+                tile.picture.put_pixel(word.id % TILE_PX, word.id / TILE_PX, colour);
+                tile.near[word.id as usize] = near;
+                tile.is_changed = true;
+            }
+        }
+        tile.seen_s = t_s;
+    }
+
+    /// The tiles that have settled at mission time `t_s` and have enough that is new.
+    pub fn poll_settled(&mut self, cell_m: f64, t_s: f64) -> Vec<FloorTile> {
+        let all = f64::from(TILE_PX * TILE_PX);
+        let width_m = f64::from(TILE_CELLS) * cell_m;
+        let mut settled = Vec::new();
+        for (at, tile) in self.tiles.iter_mut().filter(|(_, tile)| tile.is_changed && t_s - tile.seen_s >= SETTLED_S) {
+            tile.is_changed = false;
+            let seen = tile.seen();
+            if (seen as f64) < LEAST_SEEN * all || ((seen - tile.given.min(seen)) as f64) < LEAST_NEW * all {
+                continue;
+            }
+            tile.given = seen;
+            let middle = |index: i32| (f64::from(index) + 0.5) * width_m;
+            let (middle_m, picture) = ((middle(at.0), middle(at.1)), tile.filled().into());
+            settled.push(FloorTile { at: *at, picture, middle_m, width_m, t_s: tile.seen_s });
+        }
+        while self.tiles.len() > MAX_TILES {
+            let oldest = self.tiles.iter().min_by(|a, b| a.1.seen_s.total_cmp(&b.1.seen_s)).map(|(at, _)| *at);
+            oldest.map(|at| self.tiles.remove(&at));
+        }
+        settled
+    }
+}
+
+/// The mean colour of a square of pixels around a point of a frame; `None` beyond its edge.
+fn mean_around(frame: &RgbImage, (u, v): (f64, f64), edge: i64) -> Option<Rgb<u8>> {
+    let (width, height) = (i64::from(frame.width()), i64::from(frame.height()));
+    let (left, top) = ((u - edge as f64 / 2.0).round() as i64, (v - edge as f64 / 2.0).round() as i64);
+    let (mut sum, mut pixels) = ([0_u32; 3], 0);
+    for y in top.max(0)..(top + edge).min(height) {
+        for x in left.max(0)..(left + edge).min(width) {
+            let pixel = frame.get_pixel(x as u32, y as u32);
+            (0..3).for_each(|c| sum[c] += u32::from(pixel.0[c]));
+            pixels += 1;
+        }
+    }
+    (pixels > 0).then(|| Rgb(sum.map(|sum| (sum / pixels) as u8)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene_model::project::{DownCamera, Pose};
+
+    const CELL_M: f64 = 0.25;
+
+    /// The colour of the sea floor at a place, metres.
+    fn floor(x: f64, y: f64) -> Rgb<u8> {
+        Rgb([(120.0 + 60.0 * (x * 1.3).sin()) as u8, (120.0 + 60.0 * (y * 1.7).sin()) as u8, 90])
+    }
+
+    fn camera() -> DownCamera {
+        DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 }
+    }
+
+    /// A frame of that floor.
+    fn frame(pose: &Pose) -> RgbImage {
+        RgbImage::from_fn(320, 240, |u, v| {
+            let word = Word { id: 0, u: u as f32 + 0.5, v: v as f32 + 0.5 };
+            let seen = camera().project(320, 240, pose, &[word])[0];
+            floor(seen.x, seen.y)
+        })
+    }
+
+    fn pose(x: f64, y: f64, yaw_rad: f64) -> Pose {
+        Pose { x, y, z: -10.0, yaw_rad }
+    }
+
+    fn add(mosaic: &mut Mosaic, pose: Pose, t_s: f64) {
+        mosaic.add(&frame(&pose), |words| camera().project(320, 240, &pose, words), CELL_M, t_s);
+    }
+
+    #[test]
+    fn tiles_show_the_floor_at_its_place_with_north_up() {
+        let mut mosaic = Mosaic::default();
+        for (n, x) in (0..20).map(|n| (n, 0.5 * f64::from(n))) {
+            add(&mut mosaic, pose(x, 1.0, 1.2), f64::from(n));
+        }
+        assert!(mosaic.poll_settled(CELL_M, 20.0).len() < mosaic.tiles.len(), "the last ones are still in view");
+        let mut tiles = mosaic.poll_settled(CELL_M, 40.0);
+        let at = tiles.iter().position(|tile| tile.at == (4, 0)).unwrap();
+        let tile = tiles.swap_remove(at);
+        assert_eq!((tile.middle_m, tile.width_m), ((9.0, 1.0), 2.0));
+        let pitch = tile.width_m / f64::from(TILE_PX);
+        let off = |(u, v, pixel): (u32, u32, &Rgb<u8>)| {
+            let (x, y) = (8.0 + (f64::from(u) + 0.5) * pitch, 2.0 - (f64::from(v) + 0.5) * pitch);
+            (0..3).map(|c| pixel.0[c].abs_diff(floor(x, y).0[c])).max().unwrap()
+        };
+        let near = |(u, v, _): &(u32, u32, &Rgb<u8>)| *u < 96 && (16..112).contains(v);
+        assert!(tile.picture.enumerate_pixels().filter(near).all(|pixel| off(pixel) <= 4));
+    }
+
+    #[test]
+    fn a_tile_is_given_out_again_when_more_of_it_is_seen() {
+        let mut mosaic = Mosaic::default();
+        let given = |mosaic: &mut Mosaic, t_s| {
+            let tiles = mosaic.poll_settled(CELL_M, t_s);
+            tiles.iter().filter(|tile| tile.at == (0, 0)).count()
+        };
+        add(&mut mosaic, pose(0.3, 0.3, 0.0), 0.0);
+        assert_eq!([given(&mut mosaic, 5.0), given(&mut mosaic, 10.0), given(&mut mosaic, 11.0)], [0, 1, 0]);
+        add(&mut mosaic, pose(0.3, 0.3, 0.0), 12.0);
+        assert_eq!(given(&mut mosaic, 30.0), 0, "nothing more of it");
+        add(&mut mosaic, pose(1.5, 1.5, 0.0), 31.0);
+        assert_eq!(given(&mut mosaic, 60.0), 1);
+    }
+
+    #[test]
+    fn tiles_and_views_are_bounded() {
+        let mut mosaic = Mosaic::default();
+        for n in 0..200 {
+            add(&mut mosaic, pose(4.0 * f64::from(n), 2.0, 0.0), f64::from(n));
+            mosaic.poll_settled(CELL_M, f64::from(n));
+        }
+        assert_eq!(mosaic.tiles.len(), MAX_TILES);
+        let before = mosaic.tiles.clone();
+        mosaic.add(
+            &RgbImage::new(320, 240),
+            |words| camera().project(320, 240, &pose(0.0, 0.0, 0.0), words),
+            1e-4,
+            0.0,
+        );
+        mosaic.add(&RgbImage::new(320, 240), |_| Vec::new(), CELL_M, 0.0);
+        assert_eq!(mosaic.tiles.len(), before.len());
+    }
+}
