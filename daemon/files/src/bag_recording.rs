@@ -9,7 +9,7 @@ use scenecast_messages::decode as decode_cdr;
 use scenecast_messages::nav_msgs::Odometry;
 use scenecast_messages::sensor_msgs::CameraInfo;
 use scenecast_sensors::{
-    BitDepth, Calibration, CalibrationError, CameraMounting, PoseMatch, PoseTrack, SensorPose, Sight, Stamp,
+    BitDepth, Calibration, CalibrationError, CameraMounting, PoseMatch, PoseTrack, SensorPose, Stamp, ViewGeometry,
     camera_info_beside, pose_of, stamp_of_cdr,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -148,16 +148,17 @@ pub struct BagTiming {
 impl BagTiming {
     /// The image of a camera on the vehicle at a pose; `None` if it is tilted too much.
     fn frame(&self, vehicle: &SensorPose, image: FrameImage) -> Option<RecordedFrame> {
-        let (pose, sight) = match &self.calibration {
+        let (pose, geometry) = match &self.calibration {
             None => (self.mounting.camera_pose(vehicle, self.altitude_m)?, None),
             Some(calibration) => {
                 let camera = self.mounting.mounted_camera(vehicle, self.altitude_m)?;
-                let sight = Sight { calibration: calibration.clone(), tilt: camera.tilt, height_m: camera.height_m };
-                (camera.pose, Some(sight))
+                let geometry =
+                    ViewGeometry { calibration: calibration.clone(), tilt: camera.tilt, height_m: camera.height_m };
+                (camera.pose, Some(geometry))
             }
         };
         let SensorPose { x_m, y_m, depth_m, heading_rad, .. } = pose;
-        Some(RecordedFrame { t_s: 0.0, image, x_m, y_m, depth_m, heading_rad, scale: 1.0, sight, depth: None })
+        Some(RecordedFrame { t_s: 0.0, image, x_m, y_m, depth_m, heading_rad, scale: 1.0, geometry, depth: None })
     }
 }
 
@@ -333,14 +334,14 @@ mod tests {
     fn the_first_usable_calibration_of_a_bag_is_used() {
         let path = bag("calibrated", &[info(0.0), info(-1.0), info(300.0), info(400.0)]);
         let recording = open(&path, |_| {});
-        let focal = |frame: &RecordedFrame| frame.sight.as_ref().map(|sight| sight.calibration.camera().fx);
+        let focal = |frame: &RecordedFrame| frame.geometry.as_ref().map(|geometry| geometry.calibration.camera().fx);
         let focals: Vec<_> = recording.frames.iter().map(focal).collect();
         assert_eq!((focals, recording.notes.len()), (vec![Some(300.0); 2], 0));
         let of_settings = Arc::new(Calibration::of_matrix([500.0, 500.0, 2.0, 1.0]).unwrap());
         let recording = open(&path, |timing| timing.calibration = Some(of_settings.clone()));
         assert_eq!(focal(&recording.frames[0]), Some(500.0));
         let recording = open(&path, |timing| timing.reads_info = false);
-        assert!(recording.frames[0].sight.is_none());
+        assert!(recording.frames[0].geometry.is_none());
     }
 
     #[test]
@@ -395,9 +396,9 @@ mod tests {
     #[test]
     fn a_bag_without_a_usable_calibration_is_read_without() {
         let recording = open(&bag("uncalibrated", &[CameraInfo::default()]), |_| {});
-        assert!(recording.frames[0].sight.is_none() && recording.notes.is_empty());
+        assert!(recording.frames[0].geometry.is_none() && recording.notes.is_empty());
         let recording = open(&bag("wrong", &[info(-1.0)]), |_| {});
-        assert!(recording.frames[0].sight.is_none());
+        assert!(recording.frames[0].geometry.is_none());
         assert!(recording.notes[0].contains("/camera/camera_info can be used: the matrix K"), "{:?}", recording.notes);
     }
 

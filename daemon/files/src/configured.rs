@@ -7,7 +7,7 @@ use scene_model::project::View;
 use scene_model::words::Measures;
 use scenecast_config::{CalibrationSource, CameraSource, Config, NavigationSource};
 use scenecast_core::UserError;
-use scenecast_sensors::{BitDepth, Calibration, CameraMounting, Sight, read_calibration};
+use scenecast_sensors::{BitDepth, Calibration, CameraMounting, ViewGeometry, read_calibration};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,7 +25,8 @@ pub fn configured_recording(config: &Config) -> Result<Option<Recording>, UserEr
             if let Some(calibration) = calibration {
                 for frame in &mut recording.frames {
                     let height_m = altitude_m * frame.scale;
-                    frame.sight = Some(Sight { calibration: calibration.clone(), tilt: View::DOWN, height_m });
+                    frame.geometry =
+                        Some(ViewGeometry { calibration: calibration.clone(), tilt: View::DOWN, height_m });
                 }
             }
             Ok(Some(recording))

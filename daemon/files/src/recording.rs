@@ -5,7 +5,7 @@ use crate::pose_table::{Columns, Placed, PoseRow, PoseTableError, reachable_rows
 use image::RgbImage;
 use scene_model::project::View;
 use scenecast_core::{Area, UserError};
-use scenecast_sensors::{Sight, Times};
+use scenecast_sensors::{Times, ViewGeometry};
 use std::fmt::Write as _;
 use std::io::{BufRead as _, Read as _};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub struct RecordedFrame {
     /// Size of the image's pixels on the sea floor, in those of the camera's usual ones.
     pub scale: f64,
     /// The calibrated camera. With it, the pose is that of the camera itself; otherwise it is above the middle of the frame.
-    pub sight: Option<Sight>,
+    pub geometry: Option<ViewGeometry>,
     /// The distances that were measured with the image.
     pub depth: Option<DepthFile>,
 }
@@ -37,9 +37,9 @@ impl RecordedFrame {
     /// A file that cannot be read, or is not as its calibration says.
     pub fn read(&self) -> Result<(RgbImage, Option<View>), UserError> {
         let image = self.image.read()?;
-        let Some(sight) = &self.sight else { return Ok((image, None)) };
+        let Some(geometry) = &self.geometry else { return Ok((image, None)) };
         let depth = self.depth.as_ref().map(DepthFile::read).transpose()?;
-        let viewed = sight.view(image, depth);
+        let viewed = geometry.view(image, depth);
         let (image, view) = viewed.map_err(|error| UserError::Input(format!("{}: {error}", self.image)))?;
         Ok((image, Some(view)))
     }
@@ -135,7 +135,7 @@ fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, PoseTableErr
         depth_m: row.depth_m()?,
         heading_rad: row.number("heading_deg")?.to_radians(),
         scale: row.scale()?,
-        sight: None,
+        geometry: None,
         depth: None,
     })
 }
@@ -155,7 +155,7 @@ fn of_mosaic(dir: &Path, row: PoseRow<'_>, metres_per_pixel: f64) -> Result<Reco
         depth_m: 0.0,
         heading_rad: row.number("yaw_deg")?.to_radians(),
         scale,
-        sight: None,
+        geometry: None,
         depth: None,
     })
 }

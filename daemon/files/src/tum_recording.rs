@@ -9,7 +9,7 @@ use crate::pose_table::{Placed, reachable_rows};
 use crate::recording::{RecordedFrame, Recording};
 use scene_model::project::CameraPose;
 use scenecast_core::UserError;
-use scenecast_sensors::{Calibration, Rotation, Sight, Times, tilt_of};
+use scenecast_sensors::{Calibration, Rotation, Times, ViewGeometry, tilt_of};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -118,7 +118,7 @@ fn recorded(
         depth_m: pose.depth_m,
         heading_rad: pose.heading_rad,
         scale: 1.0,
-        sight: Some(Sight { calibration: calibration.clone(), tilt, height_m: options.altitude_m }),
+        geometry: Some(ViewGeometry { calibration: calibration.clone(), tilt, height_m: options.altitude_m }),
         depth: Some(DepthFile { path: frame.depth.clone(), units_per_m }),
     })
 }

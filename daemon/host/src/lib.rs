@@ -22,12 +22,12 @@ mod link_end;
 mod link_host;
 mod pilot;
 #[cfg(feature = "surface")]
-mod surface;
-mod vehicle;
+mod surface_host;
+mod vehicle_host;
 
+#[cfg(feature = "surface")]
+pub use crate::surface_host::{Follower, SurfaceHost, SurfaceHostEvent};
+pub use crate::vehicle_host::{CameraPose, MeasuredPose, VehicleHost, VehicleHostEvent};
 pub use link_end::{FrameCounts, LinkEnd};
 pub use link_host::{FrameEvent, FrameOutcome, LinkHost, channel_station, modem_station};
 pub use pilot::{PilotEvent, VehiclePilot};
-#[cfg(feature = "surface")]
-pub use surface::{Follower, SurfaceHost, SurfaceHostEvent};
-pub use vehicle::{CameraPose, MeasuredPose, VehicleHost, VehicleHostEvent};

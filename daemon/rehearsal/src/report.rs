@@ -281,7 +281,9 @@ impl Mission {
     /// Number of legs chosen after the fence took effect that leave it, cross a keep-out, or do not lead back inside
     /// after a fix has placed the vehicle outside.
     pub fn legs_outside_fence(&self) -> usize {
-        let Some(fence) = self.surface().record(self.address()).and_then(|d| d.fence.sent.as_ref()) else { return 0 };
+        let Some(fence) = self.surface().record(self.address()).and_then(|d| d.orders.fence.sent.as_ref()) else {
+            return 0;
+        };
         let outside = |from, to| scenecast_worlds::stretches_outside(&[from, to], fence) > 0;
         let is_out = |&&(from, to): &&super::mission::Leg| {
             if outside(from, from) { outside(to, to) } else { outside(from, to) }

@@ -27,16 +27,16 @@ mod stop;
 #[cfg(feature = "surface")]
 mod store;
 #[cfg(feature = "surface")]
-mod surface;
-mod vehicle;
+mod surface_process;
+mod vehicle_process;
 
+#[cfg(feature = "surface")]
+pub use crate::surface_process::{host_name, run_surface};
+pub use crate::vehicle_process::run_vehicle;
 pub use clock::Clock;
 pub use doctor::check_modem;
 pub use pilot::SimulatedAutopilot;
 pub use stop::{Load, Stop, keep_private};
-#[cfg(feature = "surface")]
-pub use surface::{host_name, run_surface};
-pub use vehicle::run_vehicle;
 
 use scenecast_core::UserError;
 use std::pin::Pin;

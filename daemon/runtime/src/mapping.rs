@@ -231,7 +231,7 @@ mod tests {
             let (x_m, y_m, depth_m, heading_rad, scale) = (0.0, 0.0, 4.0, 0.0, 1.0);
             let shot = FrameImage::File(image.clone());
             let frame =
-                RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale, sight: None, depth: None };
+                RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale, geometry: None, depth: None };
             assert!(thread.orders.send(ToMapper::Frame(Box::new(frame.into()))).is_ok());
             let mut reports: Vec<bool> = Vec::new();
             loop {

@@ -1,10 +1,10 @@
 //! The orders that a change of a part of them begins with, and hold beside an abort.
 
 use super::Surface;
+use super::given_orders::SentOrder;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::refusal::OrderRefusal;
 use super::reported_orders::status;
-use super::vehicle_record::SentOrder;
 use scenecast_protocol::directive::{Constraints, OrderStatus, Slot, SlotId, Withdrawal};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::link::{InForce, PeerView};
@@ -35,13 +35,13 @@ impl Surface {
     /// The fence that a change of a part of it begins with.
     pub fn present_fence(&self, vehicle: Address) -> Result<FenceOrder, OrderRefusal> {
         let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or(IssueError::NoVehicle)?;
-        present(&record.fence, SlotId::Fence, &view).map(|fence| FenceOrder::from(&fence))
+        present(&record.orders.fence, SlotId::Fence, &view).map(|fence| FenceOrder::from(&fence))
     }
 
     /// The limits that a change of a part of them begins with.
     pub fn present_limits(&self, vehicle: Address) -> Result<LimitsOrder, OrderRefusal> {
         let (record, view) = self.records.get(&vehicle).zip(self.view(vehicle)).ok_or(IssueError::NoVehicle)?;
-        present(&record.limits, SlotId::Limits, &view).map(|limits| LimitsOrder::from(&limits))
+        present(&record.orders.limits, SlotId::Limits, &view).map(|limits| LimitsOrder::from(&limits))
     }
 }
 

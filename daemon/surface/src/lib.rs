@@ -9,6 +9,7 @@ mod command;
 mod exemplar_cache;
 pub mod fit;
 mod floor_views;
+mod given_orders;
 mod in_force;
 mod label_book;
 mod link_meter;
@@ -26,7 +27,6 @@ mod refusal;
 mod reported_orders;
 mod request;
 mod send_orders;
-mod settings_record;
 mod snapshot;
 pub mod state;
 mod surface;
@@ -41,6 +41,7 @@ pub use command::{
 };
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use floor_views::{FloorPlace, FloorViews, floor_list};
+pub use given_orders::{GivenOrders, SentOrder, SettingsRecord};
 pub use label_book::LabelBook;
 pub use link_meter::LinkMeter;
 pub use log::{AUTOPILOT_SILENT, LogEntry, LogKind, MissionLog, NO_FAULT};
@@ -55,11 +56,10 @@ pub use orders::{
 pub use refusal::{OrderRefusal, Weighed};
 pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, cell_layers, former_labels, handle_request};
 pub use scenecast_core::{ClientName, Giver, Principal, Role};
-pub use settings_record::SettingsRecord;
 pub use snapshot::{MissionFacts, Snapshot, Truth, measured_origin, principal_info, snapshot};
 pub use surface::{Surface, SurfaceOutput};
 pub use track::{RegistrationRecord, Track};
-pub use vehicle_record::{EarlierView, SentOrder, VehicleRecord};
+pub use vehicle_record::{EarlierView, RunLabels, VehicleRecord};
 
 #[cfg(test)]
 mod command_tests;

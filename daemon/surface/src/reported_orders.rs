@@ -1,6 +1,7 @@
 //! The orders in force by the vehicle's reports, also those that this surface has not given.
 
-use super::vehicle_record::{SentOrder, VehicleRecord};
+use super::given_orders::SentOrder;
+use super::vehicle_record::VehicleRecord;
 use scenecast_protocol::directive::{OrderStatus, Slot, SlotId};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::map::MAX_LABEL;
@@ -10,19 +11,19 @@ const VERSION_OF_OTHERS: u16 = 0;
 
 /// Takes over the contents that the vehicle reports. One that this surface does not know is not shown as in force.
 pub(super) fn follow(record: &mut VehicleRecord, view: &PeerView<'_>) {
-    follow_order(&mut record.fence, SlotId::Fence, view, |slot| match slot {
+    follow_order(&mut record.orders.fence, SlotId::Fence, view, |slot| match slot {
         Slot::Fence(fence) => Some(fence.clone()),
         _ => None,
     });
-    follow_order(&mut record.limits, SlotId::Limits, view, |slot| match slot {
+    follow_order(&mut record.orders.limits, SlotId::Limits, view, |slot| match slot {
         Slot::Limits(limits) => Some(*limits),
         _ => None,
     });
-    follow_order(&mut record.areas, SlotId::Areas, view, |slot| match slot {
+    follow_order(&mut record.orders.areas, SlotId::Areas, view, |slot| match slot {
         Slot::Areas(areas) => Some(areas.clone()),
         _ => None,
     });
-    follow_order(&mut record.destination, SlotId::Destination, view, |slot| match slot {
+    follow_order(&mut record.orders.destination, SlotId::Destination, view, |slot| match slot {
         Slot::Destination(destination) => Some(*destination),
         _ => None,
     });
@@ -31,12 +32,12 @@ pub(super) fn follow(record: &mut VehicleRecord, view: &PeerView<'_>) {
         && utility.epoch == record.epoch
     {
         // How many labels there were when another surface sent it is not known.
-        (record.utility, record.weighed) = (utility.clone(), MAX_LABEL);
+        (record.orders.utility, record.orders.weighed) = (utility.clone(), MAX_LABEL);
     }
     if let (InForce::Known(Slot::Settings(settings)), None) =
         (view.in_force(SlotId::Settings), status(view, SlotId::Settings))
     {
-        record.settings.handle_reported(*settings);
+        record.orders.settings.handle_reported(*settings);
     }
 }
 

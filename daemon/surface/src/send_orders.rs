@@ -43,8 +43,8 @@ impl Surface {
         }
         let record = self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?;
         utility.epoch = record.epoch;
-        record.utility = utility.clone();
-        record.weighed = highest;
+        record.orders.utility = utility.clone();
+        record.orders.weighed = highest;
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 
@@ -62,7 +62,7 @@ impl Surface {
     pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, OrderRefusal> {
         let fence = order.read()?;
         let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
-        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.fence.sent = Some(fence);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.orders.fence.sent = Some(fence);
         Ok(version)
     }
 
@@ -70,7 +70,7 @@ impl Surface {
     pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, OrderRefusal> {
         let limits = order.read()?;
         let version = self.issue(vehicle, Slot::Limits(limits), now)?;
-        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.limits.sent = Some(limits);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.orders.limits.sent = Some(limits);
         Ok(version)
     }
 
@@ -78,7 +78,7 @@ impl Surface {
     pub fn set_areas(&mut self, vehicle: Address, order: &AreasOrder, now: Instant) -> Result<u16, OrderRefusal> {
         let areas = order.read()?;
         let version = self.issue(vehicle, Slot::Areas(areas.clone()), now)?;
-        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.areas.sent = Some(areas);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.orders.areas.sent = Some(areas);
         Ok(version)
     }
 
@@ -91,7 +91,7 @@ impl Surface {
     ) -> Result<u16, OrderRefusal> {
         let destination = order.read()?;
         let version = self.issue(vehicle, Slot::Destination(destination), now)?;
-        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.destination.sent = Some(destination);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.orders.destination.sent = Some(destination);
         Ok(version)
     }
 
@@ -100,9 +100,10 @@ impl Surface {
         let view = self.link.vehicle(vehicle).ok_or(IssueError::NoVehicle)?;
         let order = order.read(view.layers())?;
         let last = self.order_status(vehicle, SlotId::Settings);
-        let settings = self.records.get(&vehicle).ok_or(IssueError::NoVehicle)?.settings.next_order(&order, last);
+        let settings =
+            self.records.get(&vehicle).ok_or(IssueError::NoVehicle)?.orders.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
-        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.settings.handle_sent(settings, last);
+        self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?.orders.settings.handle_sent(settings, last);
         Ok(version)
     }
 

@@ -284,7 +284,7 @@ impl Surface {
 
     /// Keeps the number of cells of each label, for the gains of the last minutes.
     fn count_gains(&mut self, now: Instant) {
-        let due: Vec<Address> = self.vehicles().filter(|(_, r)| r.gains.is_due(now)).map(|(a, _)| a).collect();
+        let due: Vec<Address> = self.vehicles().filter(|(_, r)| r.labels.gains.is_due(now)).map(|(a, _)| a).collect();
         for vehicle in due {
             let Some(cells) = self.labels(vehicle) else { continue };
             if self.records.get(&vehicle).is_none_or(|record| record.earlier_map().is_none()) {
@@ -292,7 +292,7 @@ impl Surface {
             }
             self.log_correction(vehicle, now);
             if let Some(record) = self.records.get_mut(&vehicle).filter(|_| !cells.is_empty()) {
-                record.gains.handle_cells(cells, now);
+                record.labels.gains.handle_cells(cells, now);
             }
         }
     }
@@ -339,10 +339,10 @@ impl Surface {
                 let (status, version) = (decided.status, decided.version);
                 let record = self.records.get_mut(&vehicle)?;
                 if slot == SlotId::Settings {
-                    record.settings.handle_decision(status);
+                    record.orders.settings.handle_decision(status);
                 }
                 if status == OrderStatus::Applied {
-                    record.handle_applied(slot, version);
+                    record.orders.handle_applied(slot, version);
                 }
                 self.handle_decision(vehicle, slot, now);
                 self.log_decision(vehicle, slot, now);
@@ -390,7 +390,7 @@ impl Surface {
         let view = self.link.vehicle(vehicle).filter(|view| view.status().is_some())?;
         let record = self.records.get_mut(&vehicle)?;
         record.handle_names(view.classes());
-        record.tree = view.tree().cloned().or_else(|| record.tree.take());
+        record.labels.tree = view.tree().cloned().or_else(|| record.labels.tree.take());
         Some(SurfaceOutput::Changed(vehicle))
     }
 

@@ -4,36 +4,21 @@ use super::annotations::AnnotationRefusal;
 use super::annotations::Annotations;
 use super::exemplar_cache::ExemplarCache;
 use super::floor_views::FloorViews;
+use super::given_orders::GivenOrders;
 use super::label_book::LabelBook;
 use super::map_changes::{Corrections, LabelGains};
 use super::record::{EarlierMap, StoredLabel};
-use super::settings_record::SettingsRecord;
 use super::track::{Pauses, RegistrationRecord, Track};
 use scenecast_core::UsblLine;
-use scenecast_protocol::directive::{Areas, Destination, ExemplarRequests, Fence, Limits, SlotId, Utility};
+use scenecast_protocol::directive::{ExemplarRequests, SlotId};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::PeerView;
-use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelTree, MAX_LABEL};
+use scenecast_protocol::map::{ClassEntry, ClassReplica, LabelTree};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{ModeReason, VehicleMode, VehicleStatus};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// The last order of a kind that was sent, and the one in force.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SentOrder<T> {
-    /// The last one that was sent.
-    pub sent: Option<T>,
-    /// The one that the vehicle has applied, with its version.
-    pub in_force: Option<(u16, T)>,
-}
-
-impl<T> Default for SentOrder<T> {
-    fn default() -> Self {
-        Self { sent: None, in_force: None }
-    }
-}
 
 /// The map of an earlier run, or of an earlier run of the surface, which stays in view until the
 /// current one has as many cells.
@@ -53,19 +38,28 @@ struct RestoredContact {
     last_received: Option<Instant>,
 }
 
+/// What the vehicle has reported of the labels of its run.
+#[derive(Debug, Default)]
+pub struct RunLabels {
+    pub gains: LabelGains,
+    /// The last tree of the labels of this epoch.
+    pub tree: Option<LabelTree>,
+    /// The names and colours that the vehicle has given its labels in this run.
+    classes: BTreeMap<u8, ClassEntry>,
+}
+
+impl RunLabels {
+    fn begin_run(&mut self) {
+        self.gains = LabelGains::default();
+        self.classes.clear();
+    }
+}
+
 /// The last orders to a vehicle, and its last reports.
 #[derive(Debug)]
 pub struct VehicleRecord {
     pub name: String,
-    /// The last utility that was sent, and the highest label at that time.
-    pub utility: Utility,
-    pub weighed: u8,
-    pub fence: SentOrder<Fence>,
-    pub limits: SentOrder<Limits>,
-    pub areas: SentOrder<Areas>,
-    pub destination: SentOrder<Destination>,
-    /// The settings that were ordered, and those in force.
-    pub settings: SettingsRecord,
+    pub orders: GivenOrders,
     pub exemplars: ExemplarCache,
     pub floor: FloorViews,
     /// Reported positions in the map frame.
@@ -75,7 +69,7 @@ pub struct VehicleRecord {
     /// Counts the runs of the vehicle that this surface has met, from 1.
     pub run: u32,
     pub epoch: u8,
-    pub gains: LabelGains,
+    pub labels: RunLabels,
     pub(crate) corrections: Corrections,
     pub earlier: EarlierView,
     /// The usual length of its silence.
@@ -83,26 +77,15 @@ pub struct VehicleRecord {
     /// The last measurement of the surface's modem, and its time.
     pub found: Option<(UsblLine, Instant)>,
     pub annotations: Annotations,
-    /// The last tree of the labels of this epoch.
-    pub tree: Option<LabelTree>,
-    /// The names and colours that the vehicle has given its labels in this run.
-    classes: BTreeMap<u8, ClassEntry>,
     restored: RestoredContact,
 }
 
 impl VehicleRecord {
-    /// Why a vehicle holds that has nothing left to do, as a text.
-    fn end_of_survey(&self) -> &'static str {
-        let has_areas = self.areas.sent.as_ref().is_some_and(|areas| !areas.0.is_empty());
-        let has_interests = has_areas || !self.utility.weights.is_empty();
-        if has_interests { "nothing of interest is left" } else { "the survey is complete" }
-    }
-
     /// The mode of a vehicle with its reason, for people.
     pub fn mode_text(&self, status: &VehicleStatus, view: &PeerView<'_>) -> String {
         let is_ours = || view.slots().any(|order| order.id == SlotId::Constraints);
         let reason = match (status.mode, status.reason) {
-            (VehicleMode::Hold, ModeReason::Survey) => Some(self.end_of_survey()),
+            (VehicleMode::Hold, ModeReason::Survey) => Some(self.orders.end_of_survey()),
             (VehicleMode::Hold, ModeReason::Order) if !is_ours() => {
                 Some("by an earlier order, by one of another surface, or because it has no record of its orders")
             }
@@ -115,27 +98,19 @@ impl VehicleRecord {
     pub fn new(name: String) -> Self {
         Self {
             name,
-            utility: Utility::default(),
-            weighed: MAX_LABEL,
-            fence: SentOrder::default(),
-            limits: SentOrder::default(),
-            areas: SentOrder::default(),
-            destination: SentOrder::default(),
-            settings: SettingsRecord::default(),
+            orders: GivenOrders::default(),
             exemplars: ExemplarCache::default(),
             floor: FloorViews::default(),
             track: Track::default(),
             registration: RegistrationRecord::default(),
             run: 1,
             epoch: 0,
-            gains: LabelGains::default(),
+            labels: RunLabels::default(),
             corrections: Corrections::default(),
             earlier: EarlierView::default(),
             pauses: Pauses::default(),
             found: None,
             annotations: Annotations::default(),
-            tree: None,
-            classes: BTreeMap::new(),
             restored: RestoredContact::default(),
         }
     }
@@ -144,8 +119,7 @@ impl VehicleRecord {
     pub fn begin_run(&mut self) {
         self.run += 1;
         self.floor = FloorViews::default();
-        self.gains = LabelGains::default();
-        self.classes.clear();
+        self.labels.begin_run();
     }
 
     /// The last status and when its pose came in, perhaps before the start of the surface.
@@ -192,23 +166,25 @@ impl VehicleRecord {
 
     /// Takes the names and colours that the vehicle has given its labels.
     pub fn handle_names(&mut self, classes: &ClassReplica) {
-        for entry in classes.iter().filter(|entry| !self.classes.contains_key(&entry.label())) {
+        for entry in classes.iter().filter(|entry| !self.labels.classes.contains_key(&entry.label())) {
             self.annotations.label_by_default(entry);
         }
-        self.classes = classes.iter().map(|entry| (entry.label(), entry.clone())).collect();
+        self.labels.classes = classes.iter().map(|entry| (entry.label(), entry.clone())).collect();
     }
 
     /// The tree of the labels of the map in view, if one is known.
     pub fn tree_in_view(&self) -> Option<&LabelTree> {
         match self.earlier_map().filter(|earlier| earlier.epoch != self.epoch) {
             Some(earlier) => earlier.tree.as_ref(),
-            None => self.tree.as_ref(),
+            None => self.labels.tree.as_ref(),
         }
     }
 
     /// The weight of a label: the one that was sent, or that of the nearest relative of a label that the vehicle assigned later.
     pub fn weight(&self, label: u8) -> f64 {
-        self.utility.weight(self.tree.as_ref().map_or(label, |tree| tree.weighed_as(label, self.weighed)))
+        self.orders
+            .utility
+            .weight(self.labels.tree.as_ref().map_or(label, |tree| tree.weighed_as(label, self.orders.weighed)))
     }
 
     /// Sets name, colour and merging of a label in the current epoch; without a name or a colour it has those that the
@@ -218,7 +194,7 @@ impl VehicleRecord {
             return Err(AnnotationRefusal::EarlierMap);
         }
         self.annotations.set_label(label, book)?;
-        self.classes.get(&label).into_iter().for_each(|entry| self.annotations.label_by_default(entry));
+        self.labels.classes.get(&label).into_iter().for_each(|entry| self.annotations.label_by_default(entry));
         Ok(())
     }
 
@@ -242,26 +218,13 @@ impl VehicleRecord {
         self.restored = RestoredContact::default();
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
-            (self.utility, self.weighed) = (Utility { epoch: status.epoch, ..Utility::default() }, MAX_LABEL);
+            self.orders.begin_epoch(status.epoch);
             self.exemplars = ExemplarCache::default();
             self.annotations.handle_epoch();
-            self.tree = None;
-            self.classes.clear();
-            self.gains = LabelGains::default();
+            self.labels = RunLabels::default();
         }
         self.track.handle_pose(status, at);
         self.registration.handle_status(status, at);
-    }
-
-    /// The vehicle has applied the version of a slot that was sent last.
-    pub fn handle_applied(&mut self, slot: SlotId, version: u16) {
-        match slot {
-            SlotId::Fence => self.fence.in_force = self.fence.sent.clone().map(|fence| (version, fence)),
-            SlotId::Limits => self.limits.in_force = self.limits.sent.map(|limits| (version, limits)),
-            SlotId::Areas => self.areas.in_force = self.areas.sent.clone().map(|areas| (version, areas)),
-            SlotId::Destination => self.destination.in_force = self.destination.sent.map(|place| (version, place)),
-            _ => {}
-        }
     }
 
     /// Part of an exemplar came in. `head` are its first bytes, once they have arrived.

@@ -69,8 +69,8 @@ impl MapSource {
     }
 
     /// As [`Self::set_hold`], with a wait that does not depend on the backlog.
-    pub fn set_debounce(&mut self, calm: Duration) {
-        self.set_hold(Hold::For(calm));
+    pub fn set_debounce(&mut self, usual: Duration) {
+        self.set_hold(Hold::For(usual));
     }
 
     /// The number of cells that may be sent now.
@@ -105,12 +105,12 @@ impl MapSource {
     /// labels are not held back.
     pub fn set_confident(&mut self, cells: impl IntoIterator<Item = (Cell, u8, u8)>, now: Instant) -> usize {
         let mut changed = 0;
-        let calm = self.debounce.hold().calm(self.expected_backlog_bytes());
+        let usual = self.debounce.hold().usual_wait(self.expected_backlog_bytes());
         for (cell, label, confidence) in cells {
             let old = self.target.set(cell, label);
             if old != label {
                 changed += 1;
-                self.note_change(cell, (old, label), (confidence, calm), now);
+                self.note_change(cell, (old, label), (confidence, usual), now);
             } else if confidence >= MAX_CONFIDENCE {
                 self.dirty.settle(cell);
             }
@@ -119,15 +119,15 @@ impl MapSource {
         changed
     }
 
-    fn note_change(&mut self, cell: Cell, (old, label): (u8, u8), (confidence, calm): (u8, Duration), now: Instant) {
+    fn note_change(&mut self, cell: Cell, (old, label): (u8, u8), (confidence, usual): (u8, Duration), now: Instant) {
         let seen = old != UNEXPLORED && label != UNEXPLORED;
-        let wait = if seen { self.debounce.flip(cell, confidence, calm, now) } else { Duration::ZERO };
+        let wait = if seen { self.debounce.flip(cell, confidence, usual, now) } else { Duration::ZERO };
         let acked = self.acked.get(cell);
         let change = CellChange {
             differs: label != acked,
             known: acked != UNEXPLORED,
             due: now + wait,
-            longest: Debounce::longest(calm),
+            longest: Debounce::longest(usual),
         };
         self.flips_suppressed += self.dirty.change(cell, change, now);
     }

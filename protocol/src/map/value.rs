@@ -92,7 +92,7 @@ impl Hold {
     const TYPICAL: Duration = Duration::from_secs(20);
 
     /// The wait of a cell that has not flipped recently, while so many bytes wait.
-    pub(super) fn calm(self, backlog_bytes: usize) -> Duration {
+    pub(super) fn usual_wait(self, backlog_bytes: usize) -> Duration {
         match self {
             Self::For(wait) => wait,
             Self::Backlog(bits_per_s) => {
@@ -148,8 +148,9 @@ impl Debounce {
         matches!(self.hold, Hold::Backlog(_))
     }
 
-    /// Notes a flip of `cell`; returns how long its new label must be stable if that of a calm cell must for `calm`.
-    pub(super) fn flip(&mut self, cell: Cell, confidence: u8, calm: Duration, now: Instant) -> Duration {
+    /// Notes a flip of `cell`; returns how long its new label must be stable if that of a cell without recent flips must
+    /// for `usual`.
+    pub(super) fn flip(&mut self, cell: Cell, confidence: u8, usual: Duration, now: Instant) -> Duration {
         if self.hold.typical().is_zero() {
             return Duration::ZERO;
         }
@@ -157,12 +158,12 @@ impl Debounce {
         let (present, flips) = self.recall(cell, epoch);
         self.flips.set(cell, present << 3 | (flips + 1).min(MAX_FLIPS));
         let doubt = u32::from(MAX_CONFIDENCE.saturating_sub(confidence));
-        calm * (1 + u32::from(flips)) * doubt / u32::from(MAX_CONFIDENCE)
+        usual * (1 + u32::from(flips)) * doubt / u32::from(MAX_CONFIDENCE)
     }
 
     /// The longest time for which a difference is held back.
-    pub(super) fn longest(calm: Duration) -> Duration {
-        calm * MAX_WAITS
+    pub(super) fn longest(usual: Duration) -> Duration {
+        usual * MAX_WAITS
     }
 
     /// The current epoch as it is stored, and the flips still remembered; one is forgotten each epoch.
@@ -195,20 +196,20 @@ mod tests {
     #[test]
     fn a_cell_that_flips_often_waits_longer_and_is_forgiven() {
         let mut settling = Debounce::default();
-        let calm = Duration::from_secs(4);
-        settling.set_hold(Hold::For(calm));
+        let usual = Duration::from_secs(4);
+        settling.set_hold(Hold::For(usual));
         let cell = Cell::new(3, -9);
         let at = |s: u64| Instant::from_micros(s * 1_000_000);
-        let waits: Vec<u64> = (0..10).map(|i| settling.flip(cell, 0, calm, at(i)).as_secs()).collect();
+        let waits: Vec<u64> = (0..10).map(|i| settling.flip(cell, 0, usual, at(i)).as_secs()).collect();
         assert_eq!(waits, [4, 8, 12, 16, 20, 24, 28, 32, 32, 32]);
-        assert_eq!(settling.flip(cell, MAX_CONFIDENCE, calm, at(10)), Duration::ZERO);
-        assert_eq!(settling.flip(cell, 0, calm, at(64 * 8)).as_secs(), 4);
-        assert_eq!(settling.flip(Cell::new(0, 0), 2, calm, at(0)).as_millis(), 1333);
+        assert_eq!(settling.flip(cell, MAX_CONFIDENCE, usual, at(10)), Duration::ZERO);
+        assert_eq!(settling.flip(cell, 0, usual, at(64 * 8)).as_secs(), 4);
+        assert_eq!(settling.flip(Cell::new(0, 0), 2, usual, at(0)).as_millis(), 1333);
     }
 
     #[test]
     fn a_long_backlog_holds_labels_back_longer() {
-        let wait = |bytes, bits_per_s| Hold::Backlog(bits_per_s).calm(bytes).as_secs_f64();
+        let wait = |bytes, bits_per_s| Hold::Backlog(bits_per_s).usual_wait(bytes).as_secs_f64();
         assert_eq!([wait(0, 100), wait(250, 100), wait(250, 10_000), wait(9999, 100)], [0.0, 20.0, 0.2, 60.0]);
     }
 }

@@ -1,7 +1,7 @@
-//! Habitats: labels of cells by what they look like over all their sights.
+//! Habitats: labels of cells by what they look like over all their samples.
 //!
 //! The topics of the model follow the words that happened to come first: one habitat has several, depending on when it was seen. A habitat
-//! depends on neither order nor seed. Each frame is measured by itself ([`measure`]); a cell has the mean over its sights; measures are
+//! depends on neither order nor seed. Each frame is measured by itself ([`measure`]); a cell has the mean over its samples; measures are
 //! compared in units of the differences between neighbouring cells, smoothed where neighbours look alike, and clustered without random
 //! numbers. Clusters are split only where the sea floor calls for it, so a uniform floor has few. While the map grows, labels follow their
 //! cells; once it rests, it is corrected as if all had been seen at once, and then depends on no order at all.
@@ -30,10 +30,10 @@
 //! assert!((2..=16).contains(&habitats.labels()));
 //! ```
 
+mod cell_samples;
 mod cells;
 mod clusters;
 mod measures;
-mod sights;
 
 pub use clusters::LabelTree;
 pub use measures::{MEASURES, MeasuredPoint, MeasuredValues, measure};
@@ -42,10 +42,10 @@ use crate::project::Observation;
 use crate::publish::in_step;
 use crate::topics::{FlatCell, TopicId};
 use crate::words::Word;
+use cell_samples::{CellSample, CellSamples, Rest};
 use cells::{CellMap, Coordinates, Space, smoothed, squared_distance};
 use clusters::{Clusters, Rule};
 use serde::{Deserialize, Serialize};
-use sights::{Rest, Sight, Sights};
 use std::collections::BTreeMap;
 
 /// A cell keeps its label unless another centre is nearer by this times the contrast, squared units of the noise between neighbours.
@@ -77,7 +77,7 @@ pub struct HabitatCell {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Habitats {
     most: u32,
-    sights: Sights,
+    samples: CellSamples,
     /// The label of each cell after the last [`Habitats::learn`], by (y, x): as clustered, and as shown.
     clustered: BTreeMap<(i32, i32), u32>,
     shown: BTreeMap<(i32, i32), HabitatCell>,
@@ -130,7 +130,7 @@ impl Habitats {
     pub fn new(most: u32) -> Self {
         Self {
             most: most.max(1),
-            sights: Sights::default(),
+            samples: CellSamples::default(),
             clustered: BTreeMap::new(),
             shown: BTreeMap::new(),
             fresh: Vec::new(),
@@ -142,10 +142,10 @@ impl Habitats {
         }
     }
 
-    /// What each cell looks like over all its sights, by (y, x).
+    /// What each cell looks like over all its samples, by (y, x).
     #[must_use]
     pub fn appearance(&self) -> Vec<((i32, i32), MeasuredValues)> {
-        self.sights.means()
+        self.samples.means()
     }
 
     /// Allows at most `most` labels at one time, at least one, from the next [`Habitats::learn`] on.
@@ -164,15 +164,15 @@ impl Habitats {
     pub fn add(&mut self, size: (u32, u32), points: &[MeasuredPoint], places: &[Observation], cell_m: f64) {
         let cell = |metres: f64| Some((metres / cell_m).floor()).filter(|index| index.abs() < f64::from(i32::MAX / 2));
         let along = |pixel: f32, length: u32| 2.0 * f64::from(pixel) / f64::from(length.max(1)) - 1.0;
-        let mut sights: BTreeMap<(i32, i32), Sight> = BTreeMap::new();
+        let mut samples: BTreeMap<(i32, i32), CellSample> = BTreeMap::new();
         for place in places {
             let (Some(x), Some(y)) = (cell(place.x), cell(place.y)) else { continue };
             let Some(point) = points.get(place.word as usize) else { continue };
             let in_frame = [along(point.u, size.0), along(point.v, size.1)];
-            sights.entry((y as i32, x as i32)).or_default().add(in_frame, &point.values);
+            samples.entry((y as i32, x as i32)).or_default().add(in_frame, &point.values);
         }
-        for (place, sight) in sights.into_iter().filter(|(_, sight)| sight.points() >= MIN_POINTS) {
-            self.sights.add(place, &sight);
+        for (place, sample) in samples.into_iter().filter(|(_, sample)| sample.points() >= MIN_POINTS) {
+            self.samples.add(place, &sample);
             if !self.shown.contains_key(&place) {
                 self.fresh.push(place);
             }
@@ -198,7 +198,7 @@ impl Habitats {
     fn label_new(&mut self) {
         let Some(learnt) = &self.learnt else { return };
         let fresh = std::mem::take(&mut self.fresh);
-        for (place, values) in self.sights.means_of(&fresh) {
+        for (place, values) in self.samples.means_of(&fresh) {
             if let Some(cell) = learnt.nearest(&values) {
                 self.shown.insert(place, cell);
             }
@@ -218,7 +218,7 @@ impl Habitats {
         self.take(map, found);
     }
 
-    /// Clusters the whole map as if nothing were known of it. It depends on the sights alone; labels keep their number where their cells
+    /// Clusters the whole map as if nothing were known of it. It depends on the samples alone; labels keep their number where their cells
     /// overlap.
     pub fn correct(&mut self) {
         self.learn_as_new(|natural, _| natural);
@@ -249,7 +249,7 @@ impl Habitats {
 
     /// The cells as points whose distances are compared; `None` without cells.
     fn compared(&self) -> Option<Compared> {
-        let (places, values): (Vec<_>, Vec<_>) = self.sights.means().into_iter().unzip();
+        let (places, values): (Vec<_>, Vec<_>) = self.samples.means().into_iter().unzip();
         if places.is_empty() {
             return None;
         }
@@ -378,10 +378,10 @@ impl Habitats {
         labels.len()
     }
 
-    /// The number of cells with sights.
+    /// The number of cells with samples.
     #[must_use]
     pub fn cells(&self) -> usize {
-        self.sights.len()
+        self.samples.len()
     }
 
     /// Which labels become one at coarser cuts.
@@ -499,7 +499,7 @@ mod tests {
         let (mut few, many) = (fly(colours, &[0, 1, 2]), fly(colours, &[0, 1, 2, 7, 8, 9]));
         let shown = |habitats: &Habitats| (-9..9).map(|x| habitats.label_at(x, 3)).collect::<Vec<_>>();
         let before = shown(&few);
-        few.sights = many.sights.clone();
+        few.samples = many.samples.clone();
         few.learn();
         assert_eq!(shown(&few), before);
         assert!(few.label_at(-8, 60).is_some() && few.label_at(-8, 60) == few.label_at(-8, 3));

@@ -7,11 +7,11 @@
 
 mod map;
 mod stamps;
-mod vehicle;
+mod vehicle_state;
 
 pub use map::{Grid, GridLayer, MAX_GRID_CELLS, cloud, layers, occupancy};
 pub use stamps::{Stamps, valid_part};
-pub use vehicle::{Health, Place, camera_pose, diagnostics, exemplar_jpeg, fix, path, pose};
+pub use vehicle_state::{Health, Place, camera_pose, diagnostics, exemplar_jpeg, fix, path, pose};
 
 use crate::builtin_interfaces::Time;
 use crate::std_msgs::Header;

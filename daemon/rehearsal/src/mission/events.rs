@@ -139,7 +139,7 @@ impl Mission {
         (floor_m - self.config.survey.altitude_m).max(0.0)
     }
 
-    /// Whether the vehicle comes up, or the sea floor is out of the camera's sight.
+    /// Whether the vehicle comes up, or the sea floor is out of the camera's geometry.
     fn is_high(&self) -> bool {
         let depth_m = self.vehicle.vehicle().navigator().depth_m();
         !self.camera.is_recorded() && (self.motion.is_rising() || depth_m < self.survey_depth_m() - 1.0)
@@ -191,8 +191,8 @@ impl Mission {
         let ((x_m, y_m), depth_m, heading_rad) =
             (navigator.dead_reckoned().xy(), navigator.depth_m(), navigator.heading_rad());
         let shot = FrameImage::File(Default::default());
-        let (sight, depth) = (None, None);
-        let recorded = RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale, sight, depth };
+        let (geometry, depth) = (None, None);
+        let recorded = RecordedFrame { t_s, image: shot, x_m, y_m, depth_m, heading_rad, scale, geometry, depth };
         self.camera.record(image, &recorded)?;
         if !self.mapper.takes(t_s) {
             return Ok(());

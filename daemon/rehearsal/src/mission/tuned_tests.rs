@@ -39,14 +39,14 @@ impl Mission {
         self.surface_mut().set_settings(address, &order, now).unwrap();
         let give_up = now + Duration::from_secs(120);
         let is_in_force = |m: &Self| {
-            let record = &m.surface().record(address).unwrap().settings;
+            let record = &m.surface().record(address).unwrap().orders.settings;
             record.in_force() == Some(record.requested())
         };
         while !is_in_force(self) {
             assert!(self.now() < give_up, "not in force after two minutes");
             self.advance(self.now() + Duration::from_secs(1)).unwrap();
         }
-        assert_eq!(self.vehicle().settings(), self.surface().record(address).unwrap().settings.requested());
+        assert_eq!(self.vehicle().settings(), self.surface().record(address).unwrap().orders.settings.requested());
     }
 
     /// Ends the survey and drains the link.

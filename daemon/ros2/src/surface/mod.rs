@@ -6,7 +6,7 @@
 mod health;
 mod map;
 mod orders;
-mod vehicle;
+mod vehicle_topics;
 
 use crate::node::RosNode;
 use crate::stop::{self, Owned, Owner};
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::{mpsc, oneshot, watch};
-use vehicle::{Parts, VehicleTopics};
+use vehicle_topics::{Parts, VehicleTopics};
 
 fn nanos(time: SystemTime) -> i64 {
     time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)

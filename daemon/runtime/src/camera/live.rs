@@ -10,7 +10,7 @@ use scenecast_files::{configured_calibration, configured_mounting};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_sensors::{
     BitDepth, Calibration, CameraFault, CameraMounting, CameraTally, DepthError, FrameMatcher, Limits, MatchedImage,
-    Sight, Stamp,
+    Stamp, ViewGeometry,
 };
 use scenecast_sources::{
     ArrivalClock, CommandSource, DvlSource, LiveSource, Picture, Reading, SensorKind, SourceImage, SourceReport,
@@ -270,7 +270,7 @@ impl LiveCamera {
             let pose = self.mounting.camera_pose(&pose, self.altitude_m)?;
             // A pixel's size on the floor grows with the height.
             let scale = pose.altitude_m.map_or(1.0, |height| (height / self.altitude_m).clamp(SCALES.0, SCALES.1));
-            let received = ReceivedImage { picture, bits: self.bits, sight: None, depth: None };
+            let received = ReceivedImage { picture, bits: self.bits, geometry: None, depth: None };
             return Some(CameraFrame { t_s, picture: FramePicture::Received(Box::new(received)), pose, scale });
         };
         let camera = self.mounting.mounted_camera(&pose, self.altitude_m)?;
@@ -283,8 +283,8 @@ impl LiveCamera {
             }
         };
         let height_m = camera.height_m.clamp(SCALES.0 * self.altitude_m, SCALES.1 * self.altitude_m);
-        let sight = Some(Sight { calibration, tilt: camera.tilt, height_m });
-        let received = ReceivedImage { picture, bits: self.bits, sight, depth };
+        let geometry = Some(ViewGeometry { calibration, tilt: camera.tilt, height_m });
+        let received = ReceivedImage { picture, bits: self.bits, geometry, depth };
         let picture = FramePicture::Received(Box::new(received));
         Some(CameraFrame { t_s, picture, pose: camera.pose, scale: 1.0 })
     }

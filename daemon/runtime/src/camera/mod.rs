@@ -17,7 +17,7 @@ use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_host::{CameraPose, MeasuredPose};
 use scenecast_sensors::{
-    BitDepth, CalibrationError, CameraTally, DecodeError, DepthError, DepthMessage, SensorPose, Sight,
+    BitDepth, CalibrationError, CameraTally, DecodeError, DepthError, DepthMessage, SensorPose, ViewGeometry,
 };
 use scenecast_sources::Picture;
 use std::time::Duration;
@@ -50,7 +50,7 @@ pub(crate) struct ReceivedImage {
     /// The bits of levels in a compressed image with 16.
     pub(crate) bits: BitDepth,
     /// The calibrated camera, if there is a calibration.
-    pub(crate) sight: Option<Sight>,
+    pub(crate) geometry: Option<ViewGeometry>,
     /// The distances that belong to the image, and the units of whole numbers in a metre.
     pub(crate) depth: Option<(DepthMessage, f64)>,
 }
@@ -99,15 +99,15 @@ impl ReceivedImage {
     /// The image without distortion, and what it sees. Distances that cannot be used leave the floor flat.
     fn read(self) -> Result<ReadFrame, ImageFault> {
         let image = self.picture.into_rgb(self.bits)?;
-        let Some(sight) = self.sight else { return Ok(ReadFrame { image, view: None, unusable_depth: None }) };
-        let camera = sight.calibration.camera();
+        let Some(geometry) = self.geometry else { return Ok(ReadFrame { image, view: None, unusable_depth: None }) };
+        let camera = geometry.calibration.camera();
         let read = self.depth.map(|(message, units_per_m)| message.read(&camera, image.dimensions(), units_per_m));
         let (depth, unusable_depth) = match read {
             Some(Ok(depth)) => (Some(depth), None),
             Some(Err(error)) => (None, Some(error)),
             None => (None, None),
         };
-        let (image, view) = sight.view(image, depth)?;
+        let (image, view) = geometry.view(image, depth)?;
         Ok(ReadFrame { image, view: Some(view), unusable_depth })
     }
 }

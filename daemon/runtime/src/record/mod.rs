@@ -4,16 +4,16 @@
 mod log;
 mod map;
 #[cfg(feature = "surface")]
-mod surface;
-mod vehicle;
+mod surface_record;
+mod vehicle_record;
 
 pub(crate) use log::LogLines;
 use log::log_entries;
 use map::{MapState, RecordedMap};
 
 #[cfg(feature = "surface")]
-pub use surface::{SurfaceRecord, SurfaceRecorder};
-pub use vehicle::{IMAGES_INTERVAL_S, VehicleRecord, VehicleRecorder};
+pub use surface_record::{SurfaceRecord, SurfaceRecorder};
+pub use vehicle_record::{IMAGES_INTERVAL_S, VehicleRecord, VehicleRecorder};
 
 use crate::durable::free_bytes;
 use scenecast_config::Config;

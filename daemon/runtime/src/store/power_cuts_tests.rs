@@ -287,7 +287,7 @@ fn a_power_cut_at_any_step_loses_nothing_that_was_shown() {
         let surface = trial.surface.surface();
         let record = surface.record(trial.auv()).unwrap();
         assert!(!record.annotations.notes.is_empty(), "the note, cut before step {cut}");
-        assert!(record.fence.in_force.is_some() && surface.budget_bps() == 9000, "cut before step {cut}");
+        assert!(record.orders.fence.in_force.is_some() && surface.budget_bps() == 9000, "cut before step {cut}");
         let archived: Vec<u64> = trial.store.archives().filter(|map| map.id.epoch == 1).map(|map| map.cells).collect();
         let shown = trial.shown[&1] as u64;
         assert!(archived.iter().any(|&cells| cells >= shown), "{archived:?} of {shown} cells, cut before step {cut}");

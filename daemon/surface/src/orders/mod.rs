@@ -4,7 +4,7 @@ mod changes;
 mod places;
 mod record;
 mod settings;
-mod vehicle;
+mod tasks;
 
 pub use changes::OrderChanges;
 pub(crate) use places::hundredths;
@@ -15,7 +15,7 @@ pub use record::{
 use scenecast_protocol::directive::{Constraints, Slot};
 use serde_json::Value;
 pub use settings::SettingsOrder;
-pub use vehicle::{
+pub use tasks::{
     AgainOrder, BudgetOrder, CONSTRAINT_NAMES, ConstraintsAction, ConstraintsOrder, ExemplarAction, ExemplarOrder,
     RestoreOrder, SharesOrder, TakeOverOrder, UtilityOrder,
 };

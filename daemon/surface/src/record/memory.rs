@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 /// Changes of command that are kept.
 pub(crate) const MAX_COMMAND_CHANGES: usize = 32;
+
 /// How a store was begun.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Began {

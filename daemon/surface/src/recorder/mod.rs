@@ -377,7 +377,7 @@ fn order_changes(record: &VehicleRecord, view: &PeerView<'_>, memory: &VehicleMe
             events.push(VehicleEvent::Label { label, book });
         }
     }
-    let tree = record.tree.as_ref().map(LabelTree::to_bytes).unwrap_or_default();
+    let tree = record.labels.tree.as_ref().map(LabelTree::to_bytes).unwrap_or_default();
     if memory.tree != tree {
         events.push(VehicleEvent::Tree(tree));
     }

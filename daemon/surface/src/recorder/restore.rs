@@ -70,7 +70,7 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     floor.sort_by_key(|view| view.received);
     floor.into_iter().for_each(|view| record.floor.insert(view));
     record.annotations.labels.clone_from(&memory.annotations.labels);
-    record.tree = memory.tree();
+    record.labels.tree = memory.tree();
     record.annotations.notes.clone_from(&memory.annotations.notes);
     record.annotations.markers.clone_from(&memory.annotations.markers);
     record.annotations.draft.clone_from(&memory.annotations.draft);

@@ -1,8 +1,8 @@
 //! The surface's types as they are stored, and back.
 
 use crate::exemplar_cache::{OpenRequest, RequestState, StoredExemplar};
+use crate::given_orders::SettingsRecord;
 use crate::record::{StoredContact, StoredImage, StoredIntent, StoredOrder, StoredPlaces, StoredRange, StoredRequest};
-use crate::settings_record::SettingsRecord;
 use crate::vehicle_record::VehicleRecord;
 use scenecast_protocol::directive::{
     Areas, Destination, ExemplarRequest, Fence, Limits, OrderStatus, RefusalReason, Settings, Slot, SlotProgress,
@@ -92,14 +92,14 @@ pub(super) fn progress(order: &StoredOrder) -> Option<SlotProgress> {
 pub(super) fn intent(record: &VehicleRecord) -> StoredIntent {
     let fence = |fence: &Fence| slot_bytes(&Slot::Fence(fence.clone()));
     let limits = |limits: &Limits| slot_bytes(&Slot::Limits(*limits));
-    let (requested, in_force, settings_unsure) = record.settings.parts();
+    let (requested, in_force, settings_unsure) = record.orders.settings.parts();
     StoredIntent {
-        utility: slot_bytes(&Slot::Utility(record.utility.clone())),
-        weighed: record.weighed,
-        fence: record.fence.sent.as_ref().map(fence),
-        limits: record.limits.sent.as_ref().map(limits),
-        fence_in_force: record.fence.in_force.as_ref().map(|(version, f)| (*version, fence(f))),
-        limits_in_force: record.limits.in_force.as_ref().map(|(version, l)| (*version, limits(l))),
+        utility: slot_bytes(&Slot::Utility(record.orders.utility.clone())),
+        weighed: record.orders.weighed,
+        fence: record.orders.fence.sent.as_ref().map(fence),
+        limits: record.orders.limits.sent.as_ref().map(limits),
+        fence_in_force: record.orders.fence.in_force.as_ref().map(|(version, f)| (*version, fence(f))),
+        limits_in_force: record.orders.limits.in_force.as_ref().map(|(version, l)| (*version, limits(l))),
         settings_requested: slot_bytes(&Slot::Settings(requested)),
         settings_in_force: slot_bytes(&Slot::Settings(in_force)),
         settings_unsure,
@@ -110,10 +110,10 @@ pub(super) fn places(record: &VehicleRecord) -> StoredPlaces {
     let areas = |areas: &Areas| slot_bytes(&Slot::Areas(areas.clone()));
     let place = |place: &Destination| slot_bytes(&Slot::Destination(*place));
     StoredPlaces {
-        areas: record.areas.sent.as_ref().map(areas),
-        areas_in_force: record.areas.in_force.as_ref().map(|(version, a)| (*version, areas(a))),
-        destination: record.destination.sent.as_ref().map(place),
-        destination_in_force: record.destination.in_force.as_ref().map(|(version, d)| (*version, place(d))),
+        areas: record.orders.areas.sent.as_ref().map(areas),
+        areas_in_force: record.orders.areas.in_force.as_ref().map(|(version, a)| (*version, areas(a))),
+        destination: record.orders.destination.sent.as_ref().map(place),
+        destination_in_force: record.orders.destination.in_force.as_ref().map(|(version, d)| (*version, place(d))),
     }
 }
 
@@ -127,10 +127,11 @@ pub(super) fn restore_places(stored: &StoredPlaces, record: &mut VehicleRecord) 
         Some(Slot::Destination(destination)) => Some(destination),
         _ => None,
     };
-    record.areas.sent = stored.areas.as_ref().and_then(areas);
-    record.areas.in_force = stored.areas_in_force.as_ref().and_then(|(v, bytes)| Some((*v, areas(bytes)?)));
-    record.destination.sent = stored.destination.as_ref().and_then(place);
-    record.destination.in_force = stored.destination_in_force.as_ref().and_then(|(v, bytes)| Some((*v, place(bytes)?)));
+    record.orders.areas.sent = stored.areas.as_ref().and_then(areas);
+    record.orders.areas.in_force = stored.areas_in_force.as_ref().and_then(|(v, bytes)| Some((*v, areas(bytes)?)));
+    record.orders.destination.sent = stored.destination.as_ref().and_then(place);
+    record.orders.destination.in_force =
+        stored.destination_in_force.as_ref().and_then(|(v, bytes)| Some((*v, place(bytes)?)));
 }
 
 /// Puts the orders back into the record, as far as this build reads them.
@@ -151,13 +152,13 @@ pub(super) fn restore_intent(stored: &StoredIntent, record: &mut VehicleRecord) 
         Some(Slot::Settings(settings)) => settings,
         _ => Settings::default(),
     };
-    (record.utility, record.weighed) = (utility(&stored.utility), stored.weighed);
-    record.fence.sent = stored.fence.as_ref().and_then(fence);
-    record.limits.sent = stored.limits.as_ref().and_then(limits);
-    record.fence.in_force = stored.fence_in_force.as_ref().and_then(|(v, bytes)| Some((*v, fence(bytes)?)));
-    record.limits.in_force = stored.limits_in_force.as_ref().and_then(|(v, bytes)| Some((*v, limits(bytes)?)));
+    (record.orders.utility, record.orders.weighed) = (utility(&stored.utility), stored.weighed);
+    record.orders.fence.sent = stored.fence.as_ref().and_then(fence);
+    record.orders.limits.sent = stored.limits.as_ref().and_then(limits);
+    record.orders.fence.in_force = stored.fence_in_force.as_ref().and_then(|(v, bytes)| Some((*v, fence(bytes)?)));
+    record.orders.limits.in_force = stored.limits_in_force.as_ref().and_then(|(v, bytes)| Some((*v, limits(bytes)?)));
     let (requested, in_force) = (settings(&stored.settings_requested), settings(&stored.settings_in_force));
-    record.settings = SettingsRecord::of_parts(requested, in_force, stored.settings_unsure);
+    record.orders.settings = SettingsRecord::of_parts(requested, in_force, stored.settings_unsure);
 }
 
 pub(super) fn image(exemplar: &StoredExemplar) -> StoredImage {

@@ -95,22 +95,28 @@ fn note(note: &StoredNote) -> VehicleNote {
 fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
     VehicleOrders {
         utility: UtilityTerms {
-            exploration: f64::from(record.utility.exploration) / 100.0,
-            curiosity: f64::from(record.utility.curiosity) / 100.0,
-            weights: record.utility.weights.keys().map(|&label| (label, record.utility.weight(label))).collect(),
+            exploration: f64::from(record.orders.utility.exploration) / 100.0,
+            curiosity: f64::from(record.orders.utility.curiosity) / 100.0,
+            weights: record
+                .orders
+                .utility
+                .weights
+                .keys()
+                .map(|&label| (label, record.orders.utility.weight(label)))
+                .collect(),
         },
-        fence: record.fence.sent.as_ref().map(Into::into),
-        limits: record.limits.sent.as_ref().map(Into::into),
-        fence_in_force: in_force(&record.fence.in_force),
-        limits_in_force: in_force(&record.limits.in_force),
-        areas: record.areas.sent.as_ref().map(Into::into),
-        areas_in_force: in_force(&record.areas.in_force),
-        destination: record.destination.sent.as_ref().map(Into::into),
-        destination_in_force: in_force(&record.destination.in_force),
-        planner: record.settings.requested().planner.value().map(|p| PlannerKind::name(p).to_owned()),
+        fence: record.orders.fence.sent.as_ref().map(Into::into),
+        limits: record.orders.limits.sent.as_ref().map(Into::into),
+        fence_in_force: in_force(&record.orders.fence.in_force),
+        limits_in_force: in_force(&record.orders.limits.in_force),
+        areas: record.orders.areas.sent.as_ref().map(Into::into),
+        areas_in_force: in_force(&record.orders.areas.in_force),
+        destination: record.orders.destination.sent.as_ref().map(Into::into),
+        destination_in_force: in_force(&record.orders.destination.in_force),
+        planner: record.orders.settings.requested().planner.value().map(|p| PlannerKind::name(p).to_owned()),
         settings: VehicleSettings {
-            requested: SettingsOrder::of(record.settings.requested(), view.layers()),
-            in_force: record.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
+            requested: SettingsOrder::of(record.orders.settings.requested(), view.layers()),
+            in_force: record.orders.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
         },
         in_force: REPORTED_SLOTS.map(|id| (id.name().to_owned(), knowledge(view.in_force(id)))).into(),
         directive: DirectiveSlots { slots: view.slots().map(order_progress).collect() },
@@ -259,7 +265,7 @@ fn label(
         id,
         cells,
         area_m2: f64::from(cells) * cell_m * cell_m,
-        gained_m2: if is_current { record.gains.gained(id, cells) as f64 * cell_m * cell_m } else { 0.0 },
+        gained_m2: if is_current { record.labels.gains.gained(id, cells) as f64 * cell_m * cell_m } else { 0.0 },
         weight: if is_current { record.weight(id) } else { 0.0 },
         exemplar: match is_current {
             true => exemplar::progress(id, record, view, address, shift_m),

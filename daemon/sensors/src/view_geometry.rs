@@ -13,7 +13,7 @@ const MAX_DISTANCE_M: f32 = 50.0;
 
 /// A calibrated camera at the time of a frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sight {
+pub struct ViewGeometry {
     pub calibration: Arc<Calibration>,
     /// The rotation x, y, z, w from the camera's axes to those of a frame whose top points north, as [`View`] has it.
     pub tilt: [f64; 4],
@@ -21,7 +21,7 @@ pub struct Sight {
     pub height_m: f64,
 }
 
-impl Sight {
+impl ViewGeometry {
     /// The image without distortion, and what it sees. Distances from 0.02 to 50 m count. Without `depth`, or with one that has
     /// no reading, the floor is flat.
     ///
@@ -151,10 +151,10 @@ mod tests {
     #[test]
     fn distances_that_no_camera_sees_do_not_count() {
         let calibration = Arc::new(Calibration::of_matrix([100.0, 100.0, 50.0, 40.0]).unwrap());
-        let sight = Sight { calibration, tilt: View::DOWN, height_m: 4.0 };
+        let geometry = ViewGeometry { calibration, tilt: View::DOWN, height_m: 4.0 };
         let floor = |metres: Vec<f32>| {
             let depth = DepthImage { width: metres.len() as u32, height: 1, metres };
-            sight.view(RgbImage::new(100, 80), Some(depth)).unwrap().1.floor
+            geometry.view(RgbImage::new(100, 80), Some(depth)).unwrap().1.floor
         };
         let Floor::Depth(depth) = floor(vec![1e30, 3.0, 0.001, f32::NAN, -2.0, 50.0]) else { panic!() };
         assert_eq!(depth.metres, [0.0, 3.0, 0.0, 0.0, 0.0, 50.0]);

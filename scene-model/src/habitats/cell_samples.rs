@@ -1,4 +1,4 @@
-//! What the cells look like over all their sights, the lamp as seen from places that were seen often, and when a map rests.
+//! What the cells look like over all their samples, the lamp as seen from places that were seen often, and when a map rests.
 
 use super::measures::{MEASURES, MeasuredValues};
 use nalgebra::{SMatrix, SVector};
@@ -12,14 +12,14 @@ const EVEN: f64 = 500.0;
 
 /// The measures of a cell in one frame: means over its points.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Sight {
+pub(crate) struct CellSample {
     points: f64,
     values: SVector<f64, MEASURES>,
     /// Place in the frame, each direction from -1 to 1.
     place: [f64; 2],
 }
 
-impl Sight {
+impl CellSample {
     pub(crate) fn add(&mut self, place: [f64; 2], values: &MeasuredValues) {
         self.points += 1.0;
         self.values += (SVector::from(*values) - self.values) / self.points;
@@ -38,10 +38,10 @@ impl Sight {
     }
 }
 
-/// The sights of all cells, by (y, x). All are sums: their order does not matter.
+/// The samples of all cells, by (y, x). All are sums: their order does not matter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Sights {
-    cells: BTreeMap<(i32, i32), CellSights>,
+pub(crate) struct CellSamples {
+    cells: BTreeMap<(i32, i32), CellMeans>,
     /// Products of the terms of the lamp with themselves and with the measures, within cells.
     terms: SMatrix<f64, TERMS, TERMS>,
     products: SMatrix<f64, TERMS, MEASURES>,
@@ -49,24 +49,24 @@ pub(crate) struct Sights {
 
 /// Means over the points of a cell.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct CellSights {
+struct CellMeans {
     points: f64,
     values: SVector<f64, MEASURES>,
     terms: SVector<f64, TERMS>,
 }
 
-impl Sights {
-    /// Adds a sight of the cell at (y, x).
-    pub(crate) fn add(&mut self, place: (i32, i32), sight: &Sight) {
+impl CellSamples {
+    /// Adds a sample of the cell at (y, x).
+    pub(crate) fn add(&mut self, place: (i32, i32), sample: &CellSample) {
         let cell = self.cells.entry(place).or_default();
-        let (values, terms) = (sight.values - cell.values, sight.terms() - cell.terms);
-        let both = cell.points + sight.points;
+        let (values, terms) = (sample.values - cell.values, sample.terms() - cell.terms);
+        let both = cell.points + sample.points;
         if cell.points > 0.0 {
-            let weight = sight.points * cell.points / both;
+            let weight = sample.points * cell.points / both;
             self.terms += terms * terms.transpose() * weight;
             self.products += terms * values.transpose() * weight;
         }
-        let share = sight.points / both;
+        let share = sample.points / both;
         (cell.values, cell.terms, cell.points) = (cell.values + values * share, cell.terms + terms * share, both);
     }
 
@@ -80,7 +80,7 @@ impl Sights {
         self.cells.iter().map(|(&place, cell)| (place, cell.mean(&lamp))).collect()
     }
 
-    /// As [`Sights::means`], of some cells.
+    /// As [`CellSamples::means`], of some cells.
     pub(crate) fn means_of(&self, places: &[(i32, i32)]) -> Vec<((i32, i32), MeasuredValues)> {
         let lamp = self.lamp();
         places.iter().filter_map(|&place| Some((place, self.cells.get(&place)?.mean(&lamp)))).collect()
@@ -93,7 +93,7 @@ impl Sights {
     }
 }
 
-impl CellSights {
+impl CellMeans {
     fn mean(&self, lamp: &SMatrix<f64, TERMS, MEASURES>) -> MeasuredValues {
         (self.values - lamp.transpose() * self.terms).into()
     }
@@ -133,20 +133,20 @@ impl Rest {
 mod tests {
     use super::*;
 
-    fn sight(place: [f64; 2], value: f64, points: usize) -> Sight {
-        let mut sight = Sight::default();
-        (0..points).for_each(|_| sight.add(place, &[value; MEASURES]));
-        sight
+    fn sample(place: [f64; 2], value: f64, points: usize) -> CellSample {
+        let mut sample = CellSample::default();
+        (0..points).for_each(|_| sample.add(place, &[value; MEASURES]));
+        sample
     }
 
     #[test]
     fn the_order_of_sights_does_not_matter() {
         let seen = |order: &[usize]| {
-            let mut sights = Sights::default();
+            let mut samples = CellSamples::default();
             for &i in order {
-                sights.add((0, 0), &sight([0.1 * i as f64, 0.0], i as f64, 4 + i));
+                samples.add((0, 0), &sample([0.1 * i as f64, 0.0], i as f64, 4 + i));
             }
-            sights.means()[0].1[0]
+            samples.means()[0].1[0]
         };
         assert!((seen(&[1, 2, 3, 4]) - seen(&[4, 2, 3, 1])).abs() < 1e-9);
     }
@@ -154,15 +154,15 @@ mod tests {
     #[test]
     fn a_lamp_is_removed_where_places_were_seen_twice() {
         let floor = |cell: i32| f64::from(cell % 3);
-        let mut sights = Sights::default();
+        let mut samples = CellSamples::default();
         // Each cell first at the left, then at the right of the frame, where the lamp is one unit brighter.
         for cell in 0..400 {
             for right in [-0.8, 0.8] {
-                sights.add((0, cell), &sight([right, 0.0], floor(cell) + right / 1.6, 9));
+                samples.add((0, cell), &sample([right, 0.0], floor(cell) + right / 1.6, 9));
             }
         }
-        sights.add((1, 0), &sight([0.8, 0.0], 0.5, 9));
-        let means = sights.means();
+        samples.add((1, 0), &sample([0.8, 0.0], 0.5, 9));
+        let means = samples.means();
         assert!((means[400].1[0] - means[0].1[0]).abs() < 0.05, "seen at the right alone: {}", means[400].1[0]);
         assert!((means[2].1[0] - means[0].1[0] - 2.0).abs() < 0.05);
     }

@@ -1,6 +1,75 @@
-//! The operator's settings of a vehicle: as ordered, and as in force.
+//! The orders to a vehicle: as given, and as in force.
 
-use scenecast_protocol::directive::{OrderStatus, Settings};
+use scenecast_protocol::directive::{Areas, Destination, Fence, Limits, OrderStatus, Settings, SlotId, Utility};
+use scenecast_protocol::map::MAX_LABEL;
+
+/// The last order of a kind that was sent, and the one in force.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SentOrder<T> {
+    /// The last one that was sent.
+    pub sent: Option<T>,
+    /// The one that the vehicle has applied, with its version.
+    pub in_force: Option<(u16, T)>,
+}
+
+impl<T> Default for SentOrder<T> {
+    fn default() -> Self {
+        Self { sent: None, in_force: None }
+    }
+}
+
+/// The last orders to a vehicle that were sent, and those in force.
+#[derive(Debug)]
+pub struct GivenOrders {
+    /// The last utility that was sent, and the highest label at that time.
+    pub utility: Utility,
+    pub weighed: u8,
+    pub fence: SentOrder<Fence>,
+    pub limits: SentOrder<Limits>,
+    pub areas: SentOrder<Areas>,
+    pub destination: SentOrder<Destination>,
+    /// The settings that were ordered, and those in force.
+    pub settings: SettingsRecord,
+}
+
+impl Default for GivenOrders {
+    fn default() -> Self {
+        Self {
+            utility: Utility::default(),
+            weighed: MAX_LABEL,
+            fence: SentOrder::default(),
+            limits: SentOrder::default(),
+            areas: SentOrder::default(),
+            destination: SentOrder::default(),
+            settings: SettingsRecord::default(),
+        }
+    }
+}
+
+impl GivenOrders {
+    /// Why a vehicle holds that has nothing left to do, as a text.
+    pub(super) fn end_of_survey(&self) -> &'static str {
+        let has_areas = self.areas.sent.as_ref().is_some_and(|areas| !areas.0.is_empty());
+        let has_interests = has_areas || !self.utility.weights.is_empty();
+        if has_interests { "nothing of interest is left" } else { "the survey is complete" }
+    }
+
+    /// Another epoch voids the weights of labels.
+    pub(super) fn begin_epoch(&mut self, epoch: u8) {
+        (self.utility, self.weighed) = (Utility { epoch, ..Utility::default() }, MAX_LABEL);
+    }
+
+    /// The vehicle has applied the version of a slot that was sent last.
+    pub fn handle_applied(&mut self, slot: SlotId, version: u16) {
+        match slot {
+            SlotId::Fence => self.fence.in_force = self.fence.sent.clone().map(|fence| (version, fence)),
+            SlotId::Limits => self.limits.in_force = self.limits.sent.map(|limits| (version, limits)),
+            SlotId::Areas => self.areas.in_force = self.areas.sent.clone().map(|areas| (version, areas)),
+            SlotId::Destination => self.destination.in_force = self.destination.sent.map(|place| (version, place)),
+            _ => {}
+        }
+    }
+}
 
 /// The ordered settings of a vehicle. Each order contains everything that this surface has ordered, so that a newer one
 /// can replace one that the vehicle never received.
