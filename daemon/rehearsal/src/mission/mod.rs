@@ -354,6 +354,8 @@ fn script(config: &Config, area: Area) -> Script {
 }
 
 #[cfg(test)]
+mod floor_tests;
+#[cfg(test)]
 mod label_tests;
 #[cfg(test)]
 mod planned_tests;
