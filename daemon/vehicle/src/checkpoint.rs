@@ -1,7 +1,7 @@
 //! The checkpoint of a mapper: the scene model, its labels, its vocabulary and its exemplars as bytes.
 
 use super::cells::Cells;
-use super::mapper::Mapper;
+use super::mapper::{FrameWords, Mapper};
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
 use scene_model::habitats::Habitats;
@@ -63,13 +63,13 @@ impl Mapper {
             last_s: self.last_s,
             model: self.model.save(),
             book: &self.book,
-            words: self.extractor.measures(),
+            words: self.words.extractor.measures(),
             exemplars: &self.exemplars.store,
             cells: &self.cells,
         };
         let registration = self.placer.save();
-        let measures = self.extractor.measures();
-        let Self { light, online, habitats, .. } = self;
+        let measures = self.words.extractor.measures();
+        let Self { words: FrameWords { light, .. }, online, habitats, .. } = self;
         let added = (light, registration, measures.discriminant(), online, habitats);
         ENVELOPE.seal(&postcard::to_allocvec(&(kept, added)).unwrap_or_default())
     }
@@ -86,16 +86,16 @@ impl Mapper {
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
-        let configured_words = fresh.extractor.measures();
+        let configured_words = fresh.words.extractor.measures();
         let is_same_kind = habitats.is_some() == fresh.habitats.is_some();
         if *model.config() != configured || !continues(&kept_words, &configured_words) || !is_same_kind {
             return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
-        mapper.light = mapper.light.map(|fresh| light.unwrap_or(fresh));
+        mapper.words.light = mapper.words.light.map(|fresh| light.unwrap_or(fresh));
         let kept_registrar = registration.and_then(registrar_of).map(|kept| kept.with_loops(config.registration.loops));
         mapper.placer.restore(kept_registrar);
-        mapper.extractor = WordExtractor::from_measures(kept_words);
+        mapper.words.extractor = WordExtractor::from_measures(kept_words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars.store, mapper.cells, mapper.last_s) = (kept.exemplars, kept.cells, kept.last_s);
         (mapper.online, mapper.habitats) = (online, habitats);
@@ -216,7 +216,7 @@ mod tests {
         (0..5).for_each(|at| drop(frame(&mut whole, at)));
         let bytes = whole.save(1);
         let mut restored = Mapper::restore(&config, vocabulary(4), &bytes).unwrap().mapper;
-        assert_eq!(restored.extractor.measures().discriminant(), vocabulary(4).unwrap().discriminant());
+        assert_eq!(restored.words.extractor.measures().discriminant(), vocabulary(4).unwrap().discriminant());
         for at in 5..9 {
             assert_eq!(frame(&mut restored, at), frame(&mut whole, at));
         }

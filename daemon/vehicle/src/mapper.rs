@@ -18,6 +18,7 @@ use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LabelTree};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -46,9 +47,7 @@ fn published_tree(habitats: &HabitatTree, book: &LabelBook) -> Option<LabelTree>
 
 /// The scene model of one vehicle.
 pub struct Mapper {
-    pub(super) extractor: WordExtractor,
-    /// The unevenness of the light in the frames; `None` if frames are mapped as they are.
-    pub(super) light: Option<FlatField>,
+    pub(super) words: FrameWords,
     camera: DownCamera,
     cell_m: f64,
     pub(super) model: SceneModel,
@@ -64,6 +63,27 @@ pub struct Mapper {
     tuning: Tuning,
     pub(super) last_s: Option<f64>,
     pub(super) flat: Vec<FlatCell>,
+}
+
+/// The visual words of frames.
+pub(super) struct FrameWords {
+    pub(super) extractor: WordExtractor,
+    /// The unevenness of the light in the frames; `None` if frames are mapped as they are.
+    pub(super) light: Option<FlatField>,
+}
+
+impl FrameWords {
+    /// The words of a frame, and the frame under even light.
+    fn extract<'a>(&mut self, image: &'a RgbImage, cell_px: f32) -> (Vec<Word>, Cow<'a, RgbImage>) {
+        let even = match &mut self.light {
+            Some(light) => {
+                light.learn(image);
+                Cow::Owned(light.corrected(image))
+            }
+            None => Cow::Borrowed(image),
+        };
+        (self.extractor.extract(&even, cell_px), even)
+    }
 }
 
 /// How much the model works, and the configured values that the operator's settings override.
@@ -170,8 +190,7 @@ impl Mapper {
             ..SceneConfig::for_images()
         };
         Ok(Self {
-            extractor,
-            light: config.camera.flat_field.then(FlatField::default),
+            words: FrameWords { extractor, light: config.camera.flat_field.then(FlatField::default) },
             camera: DownCamera {
                 metres_per_pixel: config.camera.metres_per_pixel,
                 altitude_m: config.survey.altitude_m,
@@ -224,14 +243,9 @@ impl Mapper {
         if frame.view.is_some() {
             cell_px = cell_px.clamp(CELL_PX.0, CELL_PX.1);
         }
-        let corrected = self.light.as_mut().map(|light| {
-            light.learn(image);
-            light.corrected(image)
-        });
-        let even = corrected.as_ref().unwrap_or(image);
-        let words = self.extractor.extract(even, cell_px);
+        let (words, even) = self.words.extract(image, cell_px);
         let (size, cell_m) = (image.dimensions(), self.cell_m);
-        self.mosaic.add(even, |words| projection.project(size, &pose, words), cell_m, t_s);
+        self.mosaic.add(&even, |words| projection.project(size, &pose, words), cell_m, t_s);
         let observations = projection.project(image.dimensions(), &pose, &words);
         self.online.expect(observations.len(), &mut self.model);
         self.model.insert(t_s, &observations);

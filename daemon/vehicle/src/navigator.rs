@@ -33,6 +33,8 @@ pub struct Navigator {
     unregistered_m: f64,
     placement: Option<Placement>,
     last_fix: Option<Instant>,
+    /// Fixes that corrected the estimate.
+    fixes_used: u64,
     /// Whether the vehicle may have moved while it was off. The first fix then corrects the position on the map.
     is_displaced: bool,
     /// Whether a pose or a displacement was measured since the start.
@@ -89,6 +91,7 @@ impl Navigator {
             unregistered_m: 0.0,
             placement: None,
             last_fix: None,
+            fixes_used: 0,
             is_displaced: false,
             is_measured: false,
             refused: (0, (0.0, 0.0)),
@@ -169,6 +172,11 @@ impl Navigator {
     /// Standard deviation of the position in the world, metres.
     pub fn sigma_m(&self) -> f64 {
         self.filter.sigma_m()
+    }
+
+    /// The number of fixes that corrected the estimate.
+    pub fn fixes_used(&self) -> u64 {
+        self.fixes_used
     }
 
     /// The time at which the last fix was used.
@@ -257,6 +265,7 @@ impl Navigator {
             self.displace();
         }
         self.place();
+        self.fixes_used += 1;
         FixVerdict::Used
     }
 

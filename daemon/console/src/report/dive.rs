@@ -48,19 +48,10 @@ pub struct Dive {
 /// What a record says about a vehicle.
 #[derive(Debug, Default)]
 pub(super) struct DiveVehicle {
-    /// The labels of the operator's map at the end.
-    pub(super) labels: LabelGrid,
-    /// The same with its layers, as files have it.
-    pub(super) cells: Option<MapCells>,
-    pub(super) epoch: u8,
-    /// Cells of each layer of that map, by its name.
-    pub(super) layer_cells: BTreeMap<String, usize>,
+    /// The operator's map at the end.
+    pub(super) map: EndMap,
     /// When frames of it were received, seconds since 1970.
     pub(super) heard_s: Vec<f64>,
-    /// The edge of a cell, metres.
-    pub(super) cell_m: f64,
-    /// The areas of the classes, the largest first.
-    pub(super) classes: Vec<ClassArea>,
     /// The places that it has reported.
     pub(super) track: Vec<TrackPoint>,
     /// What its own record says.
@@ -69,14 +60,29 @@ pub(super) struct DiveVehicle {
     pub(super) restarts_s: Vec<f64>,
     /// How many times as fast as the clock the mission was.
     pub(super) mission_speed: f64,
-    /// All labels that were on the operator's map of this epoch.
-    pub(super) had: BTreeSet<u8>,
     /// The way of each order, by slot and version.
     pub(super) orders: BTreeMap<OrderKey, Vec<OrderStep>>,
     pub(super) given: BTreeMap<OrderKey, Order>,
     pub(super) exemplars: Vec<(f64, Exemplar)>,
     pub(super) link: Vec<(f64, Link)>,
     pub(super) maps: Vec<MapsAt>,
+}
+
+/// The operator's map of a vehicle at the end.
+#[derive(Debug, Default)]
+pub(super) struct EndMap {
+    pub(super) labels: LabelGrid,
+    /// The same with its layers, as files have it.
+    pub(super) cells: Option<MapCells>,
+    pub(super) epoch: u8,
+    /// Cells of each layer, by its name.
+    pub(super) layer_cells: BTreeMap<String, usize>,
+    /// The edge of a cell, metres.
+    pub(super) cell_m: f64,
+    /// The areas of the classes, the largest first.
+    pub(super) classes: Vec<ClassArea>,
+    /// All labels that were on it in this epoch.
+    pub(super) had: BTreeSet<u8>,
 }
 
 /// The map of a vehicle before a restart of its program and after it.
@@ -146,12 +152,13 @@ impl Dive {
 
     /// The map of a vehicle at the end as files have it, with what the operator has written on it.
     pub(super) fn map_cells(&self, state: &VehicleState, vehicle: &DiveVehicle) -> MapCells {
-        let cells = vehicle.cells.clone().unwrap_or_else(|| MapCells::of_labels(&vehicle.labels, vehicle.cell_m));
+        let cells =
+            vehicle.map.cells.clone().unwrap_or_else(|| MapCells::of_labels(&vehicle.map.labels, vehicle.map.cell_m));
         let caption = MapCaption {
             mission: self.state.mission.name.clone(),
             address: state.id,
             name: state.name.clone(),
-            epoch: vehicle.epoch,
+            epoch: vehicle.map.epoch,
             utc: utc_text(self.span_s.1),
             side: ReplaySide::Operator,
         };
@@ -220,12 +227,12 @@ impl DiveVehicle {
 
     /// Whether the record has all of its map, and no other one of it.
     pub(super) fn has_one_map(&self) -> bool {
-        self.epoch == 0 && self.maps.first().is_none_or(|first| first.cells == 0)
+        self.map.epoch == 0 && self.maps.first().is_none_or(|first| first.cells == 0)
     }
 
     /// The middle of a cell of its map, which lies `shift` from the world frame, metres.
     pub(super) fn middle_of(&self, cell: Cell, shift: (f64, f64)) -> (f64, f64) {
-        let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * self.cell_m + shift_m;
+        let middle = |index: i32, shift_m: f64| (f64::from(index) + 0.5) * self.map.cell_m + shift_m;
         (middle(cell.x, shift.0), middle(cell.y, shift.1))
     }
 
@@ -238,7 +245,7 @@ impl DiveVehicle {
 
     /// The label that a place in the world frame has on the map at the end; 0 without one.
     pub(super) fn label_at(&self, (shift_east_m, shift_north_m): (f64, f64), east_m: f64, north_m: f64) -> u8 {
-        let index = |m: f64| (m / self.cell_m).floor() as i32;
-        self.labels.get(Cell::new(index(east_m - shift_east_m), index(north_m - shift_north_m)))
+        let index = |m: f64| (m / self.map.cell_m).floor() as i32;
+        self.map.labels.get(Cell::new(index(east_m - shift_east_m), index(north_m - shift_north_m)))
     }
 }

@@ -130,8 +130,8 @@ impl DiveVehicle {
 
     /// The share of the cells of its map that have one of these labels.
     fn share_of_map(&self, labels: &BTreeSet<u8>) -> String {
-        let theirs = self.labels.iter().filter(|(_, label)| labels.contains(label)).count();
-        format!("{:.0} %", theirs as f64 / self.labels.explored().max(1) as f64 * 100.0)
+        let theirs = self.map.labels.iter().filter(|(_, label)| labels.contains(label)).count();
+        format!("{:.0} %", theirs as f64 / self.map.labels.explored().max(1) as f64 * 100.0)
     }
 }
 
@@ -332,9 +332,10 @@ mod tests {
         let place =
             |n: u32| TrackPoint { at_s: f64::from(n), east_m: f64::from(n), north_m: 0.5, depth_m: 5.0, sigma_m: 0.1 };
         let track = (0..=20).step_by(5).map(place).collect();
-        let mut vehicle = DiveVehicle { cell_m: 1.0, mission_speed: 1.0, track, ..DiveVehicle::default() };
+        let mut vehicle = DiveVehicle { mission_speed: 1.0, track, ..DiveVehicle::default() };
+        vehicle.map.cell_m = 1.0;
         for x in 0..20 {
-            vehicle.labels.set(Cell::new(x, 0), 1 + u8::from(x >= 10));
+            vehicle.map.labels.set(Cell::new(x, 0), 1 + u8::from(x >= 10));
         }
         for (version, (slot, at_s, content)) in (1..).zip(orders) {
             let (slot, content) = ((*slot).to_owned(), (*content).to_owned());

@@ -9,8 +9,8 @@ use std::ops::RangeInclusive;
 
 /// The limits of the operator's map in words, in metres and, with an origin, in degrees; `None` while it has no cells.
 pub(super) fn of_map(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
-    let bounds = vehicle.labels.bounds()?;
-    let (shift, cell_m) = (state.map.shift_m(), vehicle.cell_m);
+    let bounds = vehicle.map.labels.bounds()?;
+    let (shift, cell_m) = (state.map.shift_m(), vehicle.map.cell_m);
     let (west, south) = (f64::from(bounds.x) * cell_m + shift.0, f64::from(bounds.y) * cell_m + shift.1);
     let (east, north) = (west + f64::from(bounds.width) * cell_m, south + f64::from(bounds.height) * cell_m);
     let on_earth = dive.state.mission.origin.map_or_else(String::new, |origin| {
@@ -31,7 +31,7 @@ pub(super) fn of_map(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
 pub(super) fn sea_floor(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<String> {
     let cells = dive.map_cells(state, vehicle);
     let layer = cells.layers.iter().find(|layer| layer.descriptor.quantity == Quantity::Depth)?;
-    let depths: Vec<f64> = vehicle.labels.iter().filter_map(|(cell, _)| layer.value(cell)).collect();
+    let depths: Vec<f64> = vehicle.map.labels.iter().filter_map(|(cell, _)| layer.value(cell)).collect();
     let median = words::median(&depths)?;
     let (least, most) = depths.iter().fold((median, median), |(least, most), m| (least.min(*m), most.max(*m)));
     Some(match format!("{least:.1}") == format!("{most:.1}") {
@@ -62,8 +62,8 @@ fn unseen(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, shift: (f64,
                 .to_owned(),
         };
     };
-    let middles = vehicle.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));
-    let share = area.covered(middles, vehicle.cell_m);
+    let middles = vehicle.map.labels.iter().map(|(cell, _)| vehicle.middle_of(cell, shift));
+    let share = area.covered(middles, vehicle.map.cell_m);
     let fence = seen_of_fence(state, vehicle, shift);
     let fence = fence.map_or_else(String::new, |share| {
         format!(" Of the area within the fence, {:.1} % is on the map.", share * 100.0)
@@ -86,7 +86,7 @@ fn seen_of_fence(state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64))
     let corners = order.fence.as_ref()?;
     let fence = fence_of(Some(corners), &order.keep_outs, None).ok()?;
     let range = |axis: usize, shift_m: f64| {
-        let cells = corners.iter().map(|corner| ((corner[axis] - shift_m) / vehicle.cell_m).floor() as i32);
+        let cells = corners.iter().map(|corner| ((corner[axis] - shift_m) / vehicle.map.cell_m).floor() as i32);
         Some(cells.clone().min()?..=cells.max()?)
     };
     let (columns, rows) = (range(0, shift.0)?, range(1, shift.1)?);
@@ -97,7 +97,8 @@ fn seen_of_fence(state: &VehicleState, vehicle: &DiveVehicle, shift: (f64, f64))
     let place = |cell: Cell| place_of("cell", vehicle.middle_of(cell, shift).into());
     let all = rows.flat_map(|y| columns.clone().map(move |x| Cell::new(x, y)));
     let inside = all.filter(|&cell| place(cell).is_ok_and(|place| fence.allows(place)));
-    let (seen, all) = inside
-        .fold((0u64, 0u64), |(seen, all), cell| (seen + u64::from(vehicle.labels.get(cell) != UNEXPLORED), all + 1));
+    let (seen, all) = inside.fold((0u64, 0u64), |(seen, all), cell| {
+        (seen + u64::from(vehicle.map.labels.get(cell) != UNEXPLORED), all + 1)
+    });
     (all > 0).then(|| seen as f64 / all as f64)
 }

@@ -18,7 +18,7 @@ const IMAGES: usize = 3;
 /// The images of the classes, and which have none.
 pub(super) fn of_classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
     let images: Vec<(u8, String)> =
-        vehicle.classes.iter().map(|class| (class.label, images(dive, state, vehicle, class.label))).collect();
+        vehicle.map.classes.iter().map(|class| (class.label, images(dive, state, vehicle, class.label))).collect();
     let all: String = images.iter().map(|(_, images)| images.as_str()).collect();
     let bare = images.iter().filter(|(_, images)| images.is_empty());
     let bare = bare.map(|(class, _)| words::label(&state.label_book, *class));
@@ -35,7 +35,7 @@ pub(super) fn of_classes(page: &mut String, dive: &Dive, state: &VehicleState, v
     if !bare.is_empty() {
         let _ = writeln!(page, "<p>Classes of which no image was received: {}.</p>", Escaped(&bare.join(", ")));
     }
-    let changed = vehicle.classes.iter().filter(|class| {
+    let changed = vehicle.map.classes.iter().filter(|class| {
         let mut of_it = images_of(state, vehicle, class.label).peekable();
         of_it.peek().is_some() && of_it.all(|(_, exemplar)| !vehicle.shows_class(state, exemplar))
     });
@@ -52,12 +52,12 @@ pub(super) fn of_classes(page: &mut String, dive: &Dive, state: &VehicleState, v
 /// The labels that have a name or images, and no cell at the end.
 pub(super) fn without_cells(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
     let book = &state.label_book;
-    let has_cells = |label: u8| vehicle.classes.iter().any(|class| class.label == book.shown_as(label));
+    let has_cells = |label: u8| vehicle.map.classes.iter().any(|class| class.label == book.shown_as(label));
     let named = book.iter().filter(|(_, entry)| entry.name.is_some()).map(|(label, _)| *label);
     let pictured = vehicle.exemplars.iter().map(|(_, exemplar)| exemplar.label);
-    let had = vehicle.had.iter().copied();
+    let had = vehicle.map.had.iter().copied();
     let never: Vec<String> = named
-        .filter(|label| !has_cells(*label) && !vehicle.had.contains(label))
+        .filter(|label| !has_cells(*label) && !vehicle.map.had.contains(label))
         .map(|label| words::label(book, label))
         .collect();
     if !never.is_empty() {

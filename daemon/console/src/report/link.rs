@@ -176,7 +176,7 @@ impl Dive {
             ),
         };
         match class {
-            "map" => cells(sum(|vehicle| vehicle.labels.explored())),
+            "map" => cells(sum(|vehicle| vehicle.map.labels.explored())),
             "exemplar" => each(sum(|vehicle| vehicle.exemplars.len()), "image", "images", "each"),
             "status" => each(
                 sum(|vehicle| vehicle.track.len()),
@@ -217,7 +217,7 @@ fn told_budgets(budgets: &[(f64, u32)]) -> Option<String> {
 
 /// The cells of a layer of the maps at the end.
 fn sum_of_layer(dive: &Dive, layer: &str) -> usize {
-    dive.vehicles().map(|(_, vehicle)| vehicle.layer_cells.get(layer).copied().unwrap_or_default()).sum()
+    dive.vehicles().map(|(_, vehicle)| vehicle.map.layer_cells.get(layer).copied().unwrap_or_default()).sum()
 }
 
 #[cfg(test)]

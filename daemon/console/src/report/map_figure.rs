@@ -15,7 +15,7 @@ const MAX_MARKER: usize = 30;
 /// The map of the operator, north up, with the reported track, a grid of metres, a scale bar and an arrow to the north; `None` without
 /// cells.
 pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area>) -> Option<String> {
-    let bounds = vehicle.labels.bounds()?;
+    let bounds = vehicle.map.labels.bounds()?;
     let shift = state.map.shift_m();
     let path = vehicle.path();
     let places = path.iter().map(|point| (point.east_m, point.north_m));
@@ -25,7 +25,7 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area
     let corners =
         area.map(|Area { west, south, east, north }| [(west, south), (east, south), (east, north), (west, north)]);
     let places = places.chain(corners.into_iter().flatten());
-    let frame = Frame::around(bounds, vehicle.cell_m, shift, places);
+    let frame = Frame::around(bounds, vehicle.map.cell_m, shift, places);
     let mut svg = format!(
         "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
         frame.height_px() + 40.0
@@ -103,14 +103,14 @@ impl Frame {
 
 /// The class of each cell of a part of the map, row by row from the south; 0 is none.
 fn classes(Rect { x, y, width, height }: Rect, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<u8> {
-    let labels = vehicle.labels.copy_area(i64::from(x), i64::from(y), width as usize, height as usize);
+    let labels = vehicle.map.labels.copy_area(i64::from(x), i64::from(y), width as usize, height as usize);
     labels.into_iter().map(|label| state.label_book.shown_as(label)).collect()
 }
 
 /// Cells of one class side by side in a row are one rectangle.
 fn cells(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
     let shift = state.map.shift_m();
-    let edge = vehicle.cell_m;
+    let edge = vehicle.map.cell_m;
     let mut runs: BTreeMap<u8, String> = BTreeMap::new();
     for (row, classes) in classes.chunks(bounds.width.max(1) as usize).enumerate() {
         let north = (f64::from(bounds.y) + row as f64 + 1.0) * edge + shift.1;
@@ -270,7 +270,7 @@ fn numbers(
     if bounds.area() > MAX_NUMBERED {
         return;
     }
-    let (shift, edge) = (state.map.shift_m(), vehicle.cell_m);
+    let (shift, edge) = (state.map.shift_m(), vehicle.map.cell_m);
     let cell_px = edge * frame.px_m;
     let (room, apart) = ((NUMBER_ROOM / cell_px).ceil() as u32, NUMBERS_APART / cell_px);
     for (class, (column, row)) in wide_places(classes, bounds.width as usize, room, apart) {

@@ -187,7 +187,7 @@ impl Dive {
     /// The figures of the report.
     pub fn json(&self) -> serde_json::Value {
         let vehicles = self.vehicles().map(|(state, vehicle)| {
-            let classes = vehicle.classes.iter().map(|class| {
+            let classes = vehicle.map.classes.iter().map(|class| {
                 let book = &state.label_book;
                 json!({ "label": class.label, "name": book.title(class.label), "colour": book.colour_text(class.label),
                         "cells": class.cells, "area_m2": class.area_m2, "interval_m2": class.interval_m2 })
@@ -207,7 +207,7 @@ impl Dive {
                 "summary": summary::summary(self, state, vehicle).into_iter().flat_map(|(_, told)| told).collect::<Vec<_>>(),
                 "doubts": doubts::doubts(self, state, vehicle),
                 "distance_m": vehicle.distance_m(),
-                "cell_m": vehicle.cell_m,
+                "cell_m": vehicle.map.cell_m,
                 "classes": classes.collect::<Vec<_>>(),
                 "orders": orders.collect::<Vec<_>>(),
                 "effects": effects.collect::<Vec<_>>(),
@@ -248,12 +248,12 @@ impl Dive {
 }
 
 fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
-    let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
+    let all: u64 = vehicle.map.classes.iter().map(|class| class.cells).sum();
     if all == 0 {
         return;
     }
     *page += "<h3>Classes</h3>\n<table><thead><tr><th>no.</th><th>class</th><th>cells</th><th>area</th><th>95 % interval</th><th>share</th></tr></thead>\n";
-    for class in &vehicle.classes {
+    for class in &vehicle.map.classes {
         let _ = writeln!(
             page,
             "<tr><td class=\"n\">{}</td><td><span class=\"swatch\" style=\"background:{}\"></span>{}{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
@@ -268,7 +268,7 @@ fn classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveV
             class.cells as f64 / all as f64 * 100.0
         );
     }
-    let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.classes));
+    let _ = writeln!(page, "</table>\n<p>{}</p>", words::of_intervals(&vehicle.map.classes));
     images::of_classes(page, dive, state, vehicle);
     images::without_cells(page, dive, state, vehicle);
 }
@@ -280,7 +280,7 @@ fn legend(state: &VehicleState, vehicle: &DiveVehicle) -> String {
         let swatch = format!("<span class=\"swatch\" style=\"background:{colour}\"></span>");
         format!("<span>{swatch}{}</span> ", Escaped(&title))
     };
-    vehicle.classes.iter().map(entry).collect()
+    vehicle.map.classes.iter().map(entry).collect()
 }
 
 fn notes(page: &mut String, dive: &Dive, state: &VehicleState) {

@@ -1,7 +1,7 @@
 //! Reads a dive from a record.
 
 use super::areas::areas;
-use super::dive::{Dive, DiveVehicle, OwnRecord};
+use super::dive::{Dive, DiveVehicle, EndMap, OwnRecord};
 use super::link::budgets;
 use super::log::{events, images};
 use super::maps::maps_over_time;
@@ -107,18 +107,22 @@ impl DiveVehicle {
         let known = operator.get_mut(part)?;
         known.map.seek(u64::MAX, |nanos| timeline.mission_time(nanos));
         let shown = known.map.shown();
-        let mut vehicle = Self {
+        let map = EndMap {
             labels: shown.labels.shown().clone(),
             cells: Some(shown.cells(0, timeline.mission_time(timeline.span.1))),
+            epoch: shown.epoch,
             layer_cells: shown
                 .layers
                 .iter()
                 .map(|(name, layer)| (name.clone(), layer.levels().shown().explored()))
                 .collect(),
-            epoch: shown.epoch,
-            heard_s: known.heard.iter().copied().map(seconds).collect(),
             cell_m: shown.cell_m,
             classes: areas(shown, |label| state.label_book.shown_as(label)),
+            had: known.map.labels_so_far(),
+        };
+        let mut vehicle = Self {
+            map,
+            heard_s: known.heard.iter().copied().map(seconds).collect(),
             track: known.poses.iter().map(|(_, pose)| TrackPoint::of(pose)).filter(TrackPoint::is_known).collect(),
             own: own.map_or_else(OwnRecord::default, |own| OwnRecord {
                 track: measured(own.poses.iter().map(moved).filter(TrackPoint::is_known).collect(), mission_speed),
@@ -134,7 +138,6 @@ impl DiveVehicle {
             }),
             restarts_s: another_runs(&recording.log, &state.name),
             mission_speed,
-            had: known.map.labels_so_far(),
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
             maps,
             ..Self::default()

@@ -141,7 +141,7 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
 fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> Option<String> {
     let status = state.status.as_ref()?;
     let (reported, before_end_s) = (u64::from(status.cells), dive.span_s.1 - dive.unix_s(status.at_s));
-    let held = vehicle.labels.explored() as u64;
+    let held = vehicle.map.labels.explored() as u64;
     let share = (held as f64 / reported.max(1) as f64 * 100.0).min(100.0);
     let coarse = match alone {
         None => String::new(),
@@ -153,7 +153,7 @@ fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Opti
              areas may be {} too small.",
             counted(alone as usize, "cell without a neighbour stands", "cells without a neighbour stand"),
             if alone == 1 { "counts" } else { "each count" },
-            area(15.0 * alone as f64 * vehicle.cell_m * vehicle.cell_m)
+            area(15.0 * alone as f64 * vehicle.map.cell_m * vehicle.map.cell_m)
         ),
     };
     (reported > 0).then(|| {
@@ -173,7 +173,7 @@ fn arrived(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, alone: Opti
 
 /// Cells without any neighbour on the map.
 fn alone(vehicle: &DiveVehicle) -> u64 {
-    let labels = &vehicle.labels;
+    let labels = &vehicle.map.labels;
     let around = |cell: Cell| (-1..=1).flat_map(move |y| (-1..=1).map(move |x| Cell::new(cell.x + x, cell.y + y)));
     let is_alone = |cell: Cell| around(cell).filter(|near| labels.get(*near) != UNEXPLORED).count() == 1;
     labels.iter().filter(|(cell, _)| is_alone(*cell)).count() as u64
@@ -192,19 +192,19 @@ fn is_coarse(vehicle: &DiveVehicle) -> bool {
 }
 
 fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> String {
-    let all: u64 = vehicle.classes.iter().map(|class| class.cells).sum();
-    let Some(largest) = vehicle.classes.first() else { return "No part of the map arrived.".to_owned() };
+    let all: u64 = vehicle.map.classes.iter().map(|class| class.cells).sum();
+    let Some(largest) = vehicle.map.classes.first() else { return "No part of the map arrived.".to_owned() };
     // Cells that were sent for 16 count as one.
     let is_least = alone.is_some_and(|alone| alone > 0);
     let doubt = largest.interval_m2.filter(|_| !is_least).map_or_else(String::new, |_| {
         format!("; 95 % interval by the model's own confidence: {}", interval(largest.interval_m2))
     });
-    let confident = vehicle.layer_cells.get("confidence").copied().unwrap_or_default() as u64;
+    let confident = vehicle.map.layer_cells.get("confidence").copied().unwrap_or_default() as u64;
     let confident = match doubt.is_empty() || confident >= all {
         true => String::new(),
         false => format!(" (the confidence of {confident} of the {all} cells arrived)"),
     };
-    let rivals = vehicle.classes.iter().skip(1).filter(|class| class.may_exceed(largest)).count();
+    let rivals = vehicle.map.classes.iter().skip(1).filter(|class| class.may_exceed(largest)).count();
     let rivals = match rivals {
         _ if is_least => String::new(),
         0 => String::new(),
@@ -215,9 +215,9 @@ fn found(state: &VehicleState, vehicle: &DiveVehicle, alone: Option<u64>) -> Str
     };
     format!(
         "The map that arrived has {all} cells of {0:.2} m x {0:.2} m, {1}, with {2} classes; the largest is {3} with {4} ({5:.0} %){doubt}{confident}.{rivals}",
-        vehicle.cell_m,
-        area(all as f64 * vehicle.cell_m * vehicle.cell_m),
-        vehicle.classes.len(),
+        vehicle.map.cell_m,
+        area(all as f64 * vehicle.map.cell_m * vehicle.map.cell_m),
+        vehicle.map.classes.len(),
         words::class(state, vehicle, largest.label),
         if is_least { format!("at least {}", area(largest.area_m2)) } else { area(largest.area_m2) },
         largest.cells as f64 / all as f64 * 100.0

@@ -70,7 +70,7 @@ pub(super) fn author(name: &str) -> &str {
 /// The labels that are shown as a class: those with cells, and those that were merged into it.
 fn labels_of(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> BTreeSet<u8> {
     let book = &state.label_book;
-    let on_map = vehicle.labels.iter().map(|(_, label)| label);
+    let on_map = vehicle.map.labels.iter().map(|(_, label)| label);
     on_map.chain(book.keys().copied()).filter(|label| book.shown_as(*label) == class).collect()
 }
 

@@ -1,8 +1,8 @@
 //! The images of the sea floor that the operator gets show it, each at its place.
 
 use super::tuned_tests::mission;
-use image::imageops::{FilterType, resize};
 use image::RgbImage;
+use image::imageops::{FilterType, resize};
 use scenecast_protocol::time::Instant;
 use scenecast_worlds::View;
 

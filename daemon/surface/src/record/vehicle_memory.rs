@@ -32,12 +32,7 @@ pub struct VehicleMemory {
     /// The faults of the equipment in the last status, as on the wire.
     pub(crate) faults: u8,
     pub(crate) orders: OrderMemory,
-    /// By label, in the order of arrival.
-    pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
-    /// Views of the sea floor by their middle.
-    pub(crate) floor: BTreeMap<(i32, i32), StoredImage>,
-    /// Serial number of requests and the open one, by label.
-    pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
+    pub(crate) images: ImageMemory,
     pub(crate) annotations: AnnotationMemory,
     /// The tree of the labels as on the wire; empty before the first.
     pub(crate) tree: Vec<u8>,
@@ -86,7 +81,7 @@ impl VehicleMemory {
 
     /// The images that have arrived, by label.
     pub fn exemplars(&self) -> &BTreeMap<u8, Vec<StoredImage>> {
-        &self.exemplars
+        &self.images.exemplars
     }
 
     /// Time in microseconds, metres east and north.
@@ -135,25 +130,13 @@ impl VehicleMemory {
             VehicleEvent::Places(places) => self.orders.places.clone_from(places),
             VehicleEvent::InForce(contents) => self.orders.in_force.clone_from(contents),
             VehicleEvent::Exemplar { label, image } => {
-                let images = self.exemplars.entry(*label).or_default();
-                images.retain(|kept| kept.number != image.number);
-                images.push(image.clone());
+                self.images.remove(*label, image.number);
+                self.images.exemplars.entry(*label).or_default().push(image.clone());
             }
-            VehicleEvent::ExemplarGone { label, number } => {
-                let images = self.exemplars.entry(*label).or_default();
-                images.retain(|kept| kept.number != *number);
-                if images.is_empty() {
-                    self.exemplars.remove(label);
-                }
-            }
-            VehicleEvent::Floor(view) => _ = self.floor.insert(view.middle_dm, view.clone()),
-            VehicleEvent::FloorGone(middle_dm) => _ = self.floor.remove(middle_dm),
-            VehicleEvent::Request { label, serial, open } => {
-                match (*serial, *open) {
-                    (0, None) => self.requests.remove(label),
-                    request => self.requests.insert(*label, request),
-                };
-            }
+            VehicleEvent::ExemplarGone { label, number } => self.images.remove(*label, *number),
+            VehicleEvent::Floor(view) => _ = self.images.floor.insert(view.middle_dm, view.clone()),
+            VehicleEvent::FloorGone(middle_dm) => _ = self.images.floor.remove(middle_dm),
+            VehicleEvent::Request { label, serial, open } => self.images.set_request(*label, (*serial, *open)),
             VehicleEvent::Label { label, book } => self.annotations.set_label(*label, book),
             VehicleEvent::Note(note) => self.annotations.add_note(note),
             VehicleEvent::Marker(marker) => self.annotations.set_marker(marker),
@@ -195,7 +178,7 @@ impl VehicleMemory {
         all.extend(self.orders.to_events());
         all.push(VehicleEvent::Draft(self.annotations.draft.clone()));
         let request = |(&label, &(serial, open))| VehicleEvent::Request { label, serial, open };
-        all.extend(self.requests.iter().map(request));
+        all.extend(self.images.requests.iter().map(request));
         all
     }
 
@@ -213,10 +196,7 @@ impl VehicleMemory {
         if !self.tree.is_empty() {
             all.push(VehicleEvent::Tree(self.tree.clone()));
         }
-        for (&label, images) in &self.exemplars {
-            all.extend(images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }));
-        }
-        all.extend(self.floor.values().cloned().map(VehicleEvent::Floor));
+        all.extend(self.images.to_events());
         all.extend(self.annotations.to_events());
         all
     }
@@ -267,6 +247,42 @@ impl TravelMemory {
 fn extend(track: &mut VecDeque<(u64, f64, f64)>, points: &[(u64, f64, f64)]) {
     track.extend(points.iter().copied());
     track.drain(..track.len().saturating_sub(MAX_TRACK));
+}
+
+/// The images that a vehicle has sent, and the requests for more.
+#[derive(Debug, Default)]
+pub(crate) struct ImageMemory {
+    /// By label, in the order of arrival.
+    pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
+    /// By their middle.
+    pub(crate) floor: BTreeMap<(i32, i32), StoredImage>,
+    /// Serial number of requests and the open one, by label.
+    pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,
+}
+
+impl ImageMemory {
+    fn remove(&mut self, label: u8, number: u8) {
+        let images = self.exemplars.entry(label).or_default();
+        images.retain(|kept| kept.number != number);
+        if images.is_empty() {
+            self.exemplars.remove(&label);
+        }
+    }
+
+    fn set_request(&mut self, label: u8, request: (u8, Option<StoredRequest>)) {
+        match request {
+            (0, None) => self.requests.remove(&label),
+            request => self.requests.insert(label, request),
+        };
+    }
+
+    /// The images; requests belong to no run.
+    fn to_events(&self) -> impl Iterator<Item = VehicleEvent> {
+        let of_label = |(&label, images): (&u8, &Vec<StoredImage>)| {
+            images.iter().map(|image| VehicleEvent::Exemplar { label, image: image.clone() }).collect::<Vec<_>>()
+        };
+        self.exemplars.iter().flat_map(of_label).chain(self.floor.values().cloned().map(VehicleEvent::Floor))
+    }
 }
 
 /// The orders to a vehicle.

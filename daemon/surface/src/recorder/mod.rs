@@ -315,12 +315,12 @@ fn exemplar_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut
     let here = |label: u8, number: u8| {
         record.exemplars.label(label).is_some_and(|entry| entry.stored.iter().any(|p| p.number == number))
     };
-    for (&label, images) in &memory.exemplars {
+    for (&label, images) in &memory.images.exemplars {
         let gone = images.iter().filter(|image| !here(label, image.number));
         events.extend(gone.map(|image| VehicleEvent::ExemplarGone { label, number: image.number }));
     }
     for (label, entry) in record.exemplars.labels() {
-        let kept: &Vec<StoredImage> = memory.exemplars.get(&label).unwrap_or(&none);
+        let kept: &Vec<StoredImage> = memory.images.exemplars.get(&label).unwrap_or(&none);
         let is_kept = |number, size, received: Instant| {
             kept.iter().any(|k| (k.number, k.size, k.received) == (number, size, received.as_micros()))
         };
@@ -328,21 +328,22 @@ fn exemplar_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut
         events.extend(news.map(|p| VehicleEvent::Exemplar { label, image: stored::image(p) }));
     }
     let labels: BTreeSet<u8> =
-        record.exemplars.labels().map(|(label, _)| label).chain(memory.requests.keys().copied()).collect();
+        record.exemplars.labels().map(|(label, _)| label).chain(memory.images.requests.keys().copied()).collect();
     for label in labels {
         let (serial, open) = record.exemplars.label(label).map_or((0, None), |entry| entry.open_request());
         let open = open.map(|open| stored::request(&open));
-        if memory.requests.get(&label).copied().unwrap_or_default() != (serial, open) {
+        if memory.images.requests.get(&label).copied().unwrap_or_default() != (serial, open) {
             events.push(VehicleEvent::Request { label, serial, open });
         }
     }
 }
 
 fn floor_changes(record: &VehicleRecord, memory: &VehicleMemory, events: &mut Vec<VehicleEvent>) {
-    let gone = memory.floor.keys().filter(|place| record.floor.get(**place).is_none());
+    let gone = memory.images.floor.keys().filter(|place| record.floor.get(**place).is_none());
     events.extend(gone.map(|place| VehicleEvent::FloorGone(*place)));
     let is_kept = |place, view: &StoredExemplar| {
         memory
+            .images
             .floor
             .get(&place)
             .is_some_and(|kept| (kept.size, kept.received) == (view.size, view.received.as_micros()))

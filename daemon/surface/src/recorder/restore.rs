@@ -59,14 +59,14 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
     record.found = memory.contact.range();
     record.earlier.version_base = memory.map_version.saturating_add(1);
     let mut exemplars = ExemplarCache::default();
-    for (&label, images) in &memory.exemplars {
+    for (&label, images) in &memory.images.exemplars {
         images.iter().for_each(|image| exemplars.restore_image(label, stored::exemplar(image)));
     }
-    for (&label, (serial, open)) in &memory.requests {
+    for (&label, (serial, open)) in &memory.images.requests {
         exemplars.restore_request(label, *serial, open.as_ref().map(|open| stored::open_request(label, open)));
     }
     record.exemplars = exemplars;
-    let mut floor: Vec<_> = memory.floor.values().map(stored::exemplar).collect();
+    let mut floor: Vec<_> = memory.images.floor.values().map(stored::exemplar).collect();
     floor.sort_by_key(|view| view.received);
     floor.into_iter().for_each(|view| record.floor.insert(view));
     record.annotations.labels.clone_from(&memory.annotations.labels);

@@ -90,7 +90,6 @@ pub struct Vehicle {
     /// Whether an order was applied that may change the path, so that the surface needs a new pose.
     has_new_orders: bool,
     outputs: VecDeque<VehicleOutput>,
-    fixes_applied: u64,
     equipment: EquipmentState,
 }
 
@@ -124,7 +123,6 @@ impl Vehicle {
             settings,
             has_new_orders: false,
             outputs: VecDeque::new(),
-            fixes_applied: 0,
             equipment: EquipmentState::default(),
         };
         if vehicle.weights.ordered().is_none() && vehicle.durable.utility.order.take().is_some() {

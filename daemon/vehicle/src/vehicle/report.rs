@@ -91,7 +91,7 @@ impl Vehicle {
 
     /// The number of fixes that corrected the position estimate.
     pub fn fixes_applied(&self) -> u64 {
-        self.fixes_applied
+        self.navigator.fixes_used()
     }
 
     /// The current goal in the map frame.

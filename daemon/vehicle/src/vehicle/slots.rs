@@ -149,7 +149,6 @@ impl Vehicle {
         let taken = now - Duration::from_secs_f64(fix.age_s);
         match self.navigator.handle_fix(fix.position, fix.sigma_m, taken, now) {
             FixVerdict::Used => {
-                self.fixes_applied += 1;
                 self.durable.place = Some(LastPlace::of(&self.navigator));
                 self.outputs.push_back(VehicleOutput::Fixed(fix, taken));
                 Ok(())
