@@ -179,6 +179,11 @@ impl Steering {
         self.replan();
     }
 
+    /// The weight that the areas give a place of the world frame.
+    pub fn weight_of_place(&self, place: Point) -> f64 {
+        f64::from(Interest { utility: &Utility::default(), areas: &self.areas }.weight_of_place(place))
+    }
+
     /// Puts weighted areas in force that were checked.
     pub fn set_areas(&mut self, areas: Areas) {
         self.areas = areas.0;

@@ -83,10 +83,10 @@ impl FloorPictures {
     }
 
     /// Sends the next pictures: every tile in its small size, the oldest first, then the whole ones, those with the greatest `weight` of
-    /// their tile first.
+    /// their tile and its middle first.
     pub(super) fn serve(
         &mut self,
-        weight: impl Fn(TilePlace) -> f64,
+        weight: impl Fn(TilePlace, (f64, f64)) -> f64,
         frames: &FrameClock,
         link: &mut VehicleLink,
         now: Instant,
@@ -120,11 +120,11 @@ impl FloorPictures {
         self.series = series;
     }
 
-    fn next(&self, weight: impl Fn(TilePlace) -> f64) -> Option<TilePlace> {
+    fn next(&self, weight: impl Fn(TilePlace, (f64, f64)) -> f64) -> Option<TilePlace> {
         let small = self.tiles.iter().filter(|(_, tile)| tile.sizes == 0).min_by_key(|(_, tile)| tile.serial);
         let whole = || {
             let open = self.tiles.iter().filter(|(_, tile)| tile.sizes == WHOLE);
-            let weighed = open.map(|(at, tile)| (weight(*at), tile.serial, at));
+            let weighed = open.map(|(at, tile)| (weight(*at, tile.kept.middle_m()), tile.serial, at));
             weighed.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).map(|(_, _, at)| at)
         };
         small.map(|(at, _)| at).or_else(whole).copied()
@@ -147,6 +147,16 @@ impl FloorPictures {
             if let Some(tile) = self.tiles.get_mut(&at).filter(|tile| tile.serial == serial) {
                 tile.sizes = tile.sizes.min(size);
             }
+        }
+    }
+}
+
+impl Kept {
+    /// The middle in the map frame, metres east and north.
+    fn middle_m(&self) -> (f64, f64) {
+        match self {
+            Self::Picture(picture) => picture.middle_m,
+            Self::Sent(view) => view.view.middle_m(),
         }
     }
 }
@@ -192,7 +202,7 @@ mod tests {
     fn sent(floor: &mut FloorPictures, link: &mut VehicleLink) -> Vec<(i32, u8)> {
         let mut sent = Vec::new();
         loop {
-            floor.serve(|(column, _)| f64::from(column), &FrameClock::default(), link, Instant::ZERO);
+            floor.serve(|(column, _), _| f64::from(column), &FrameClock::default(), link, Instant::ZERO);
             if floor.in_flight.is_empty() {
                 return sent;
             }
@@ -216,7 +226,7 @@ mod tests {
     fn what_was_in_flight_is_sent_again_after_a_restart_of_the_link() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
         floor.add(&[tile(1)]);
-        floor.serve(|_| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        floor.serve(|_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
         let object = floor.in_flight[0].object;
         floor.handle_restart(&mut link);
         assert_eq!(sent(&mut floor, &mut link), [(1, 1)], "it was on its way whole");
@@ -229,10 +239,10 @@ mod tests {
     fn no_more_is_in_flight_than_the_link_takes_and_nothing_unless_it_is_listed() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
         floor.add(&(0..40).map(tile).collect::<Vec<_>>());
-        floor.serve(|_| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        floor.serve(|_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
         assert!((1..=MAX_IN_FLIGHT).contains(&floor.in_flight.len()));
         link.set_background(BackgroundOrder::new(&[BackgroundStream::Exemplars]).unwrap());
-        floor.serve(|_| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        floor.serve(|_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
         assert_eq!((floor.in_flight.len(), link.background_object_bytes()), (0, 0));
     }
 

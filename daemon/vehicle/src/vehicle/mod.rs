@@ -274,11 +274,15 @@ impl Vehicle {
     }
 
     fn serve_exemplars(&mut self, now: Instant) {
-        let Self { weights, gallery, floor, link, storing, publisher, .. } = self;
+        let Self { weights, gallery, floor, link, storing, publisher, navigator, guidance, .. } = self;
         gallery.set_frames(publisher.frames());
         gallery.serve(storing.epoch(), |label| weights.weight(label), link, now);
         let map = publisher.seen().0;
-        let weight = |at| cells_of_tile(at).map(|cell| weights.weight(map.get(cell))).sum();
+        let weight = |at, (x_m, y_m): (f64, f64)| {
+            let place = navigator.to_world(MapPoint { x_m, y_m });
+            let of_place = guidance.steering().weight_of_place((place.east_m, place.north_m));
+            cells_of_tile(at).map(|cell| weights.weight(map.get(cell)) + of_place).sum()
+        };
         floor.serve(weight, &publisher.frames(), link, now);
     }
 
