@@ -20,6 +20,8 @@ const SETTLED_S: f64 = 10.0;
 /// The part of a tile that has to be seen, and that has to be new since it was given out last.
 const LEAST_SEEN: f64 = 0.3;
 const LEAST_NEW: f64 = 0.1;
+/// A frame is added if it lies so far from the last one, in parts of what it reaches from its middle.
+const LEAST_STEP: f64 = 0.15;
 /// How much nearer to the middle of its frame a pixel has to be than the one that it replaces, of 255.
 const NEARER: u8 = 12;
 
@@ -138,6 +140,8 @@ impl Lie {
 #[derive(Debug, Clone, Default)]
 pub struct Mosaic {
     tiles: BTreeMap<TilePlace, Tile>,
+    /// Place of the last frame that was added, metres, and its mission time, seconds.
+    last: Option<((f64, f64), f64)>,
 }
 
 impl Mosaic {
@@ -146,6 +150,12 @@ impl Mosaic {
         let Some(lie) = Lie::of(frame.dimensions(), &project) else { return };
         let edge_m = f64::from(TILE_CELLS) * cell_m;
         let (east_m, north_m) = lie.reach_m();
+        // What a frame shows better than one from about the same place is not worth the time.
+        let is_near = |(x, y): (f64, f64)| (x - lie.place.0).hypot(y - lie.place.1) < LEAST_STEP * east_m.min(north_m);
+        if self.last.is_some_and(|(place, last_s)| is_near(place) && (t_s - last_s).abs() < SETTLED_S / 2.0) {
+            return;
+        }
+        self.last = Some((lie.place, t_s));
         let span = |at: f64, reach: f64| {
             let tile = |m: f64| (m / edge_m).floor();
             (tile(at - reach) as i64, tile(at + reach) as i64)
@@ -198,10 +208,11 @@ impl Mosaic {
         }
         let box_px = ((lie.pixels(pitch, 0.0).0.hypot(lie.pixels(pitch, 0.0).1)).round() as i64).clamp(1, 8);
         let tile = self.tiles.entry(at).or_insert_with(|| Tile::new(t_s));
-        // A pixel is where it is in the frame, less what the camera puts it beside its place: the second step of Newton's method.
-        let seen: BTreeMap<u32, Observation> = project(&words).into_iter().map(|seen| (seen.word, seen)).collect();
+        // A second step of Newton's method: a pixel is moved by what the camera puts it beside its place. Places come in the order of
+        // the pixels, without those that see no floor.
+        let mut seen = project(&words).into_iter().peekable();
         for (word, near) in words.iter().zip(near) {
-            let Some(seen) = seen.get(&word.id) else { continue };
+            let Some(seen) = seen.next_if(|seen| seen.word == word.id) else { continue };
             let (x, y) = place(word.id);
             let (right, down) = lie.pixels(x - seen.x, y - seen.y);
             let (u, v) = (f64::from(word.u) + right, f64::from(word.v) + down);
