@@ -97,13 +97,18 @@ impl Exemplar {
 ///
 /// ```text
 /// byte  field
-///  0-2   0, which is no label
-///  3    bits 7-6 size: an edge of 64 << size pixels; bits 5-0 0
+///  0    label epoch: the map that it lies on
+///  1-2   0, which is no label
+///  3    bits 7-6 size: an edge of 64 << size pixels; bits 5-0 the part of it that was seen, in 63rds
 ///  4-14 what it shows ([`ExemplarView`]), of a known width
 /// 15..  VP8 key frame without start code and size
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FloorView {
+    /// The epoch of the label ids.
+    pub epoch: u8,
+    /// The part of it that a camera frame has shown, in 63rds: 1..=63.
+    pub seen: u8,
     /// The edge is 64 << `size` pixels; 0..=3.
     pub size: u8,
     /// Its width, at least 1 mm, and its middle. The clock is that of the latest camera frame in it.
@@ -113,9 +118,12 @@ pub struct FloorView {
 }
 
 impl FloorView {
+    /// The part that was seen of one that was seen whole.
+    pub const WHOLE: u8 = 63;
+
     /// Encodes header and image for the sender of objects.
     pub fn encode(&self) -> Vec<u8> {
-        let mut object = vec![0, 0, 0, self.size << 6];
+        let mut object = vec![self.epoch, 0, 0, self.size << 6 | self.seen & Self::WHOLE];
         self.view.encode(&mut object);
         object.extend_from_slice(&self.bytes);
         object
@@ -123,11 +131,12 @@ impl FloorView {
 
     /// Decodes an object; `None` if it is another one, such as an exemplar.
     pub fn decode(object: &[u8]) -> Option<Self> {
-        let (&[0, 0, 0, what], rest) = object.split_first_chunk::<4>()? else { return None };
+        let (&[epoch, 0, 0, what], rest) = object.split_first_chunk::<4>()? else { return None };
         let (view, bytes) = rest.split_first_chunk()?;
         let view = ExemplarView::decode(view);
-        let is_sound = what & ExemplarRequest::MAX_PICTURE == 0 && view.width_mm > 0 && !bytes.is_empty();
-        is_sound.then(|| Self { size: what >> 6, view, bytes: bytes.to_vec() })
+        let seen = what & Self::WHOLE;
+        let is_sound = seen > 0 && view.width_mm > 0 && !bytes.is_empty();
+        is_sound.then(|| Self { epoch, seen, size: what >> 6, view, bytes: bytes.to_vec() })
     }
 
     /// The WebP file; `None` if the bytes cannot be one. The pixels are not decoded here.
@@ -258,8 +267,8 @@ mod tests {
     #[test]
     fn golden_bytes_of_a_view_of_the_floor() {
         let view = ExemplarView { width_mm: 2000, east_dm: 310, north_dm: -10, clock_ms: Some(0x01_0203) };
-        let sent = FloorView { size: 1, view, bytes: vec![0x10, 0, 0, 9] };
-        let object = [0, 0, 0, 0x40, 7, 0xD0, 0, 1, 0x36, 0xFF, 0xFF, 0xF6, 1, 2, 3, 0x10, 0, 0, 9];
+        let sent = FloorView { epoch: 2, seen: 9, size: 1, view, bytes: vec![0x10, 0, 0, 9] };
+        let object = [2, 0, 0, 0x49, 7, 0xD0, 0, 1, 0x36, 0xFF, 0xFF, 0xF6, 1, 2, 3, 0x10, 0, 0, 9];
         assert_eq!(sent.encode(), object);
         assert_eq!((FloorView::decode(&object), Exemplar::decode(&object)), (Some(sent), None));
         let with = |at: usize, byte: u8| {
@@ -267,7 +276,7 @@ mod tests {
             wrong[at] = byte;
             FloorView::decode(&wrong)
         };
-        assert_eq!([with(0, 1), with(1, 5), with(2, 1), with(3, 0x41)], [const { None }; 4]);
+        assert_eq!([with(1, 5), with(2, 1), with(3, 0x40)], [const { None }; 3]);
         let of_no_width = [&object[..4], &[0; 2], &object[6..]].concat();
         assert_eq!((FloorView::decode(&of_no_width), FloorView::decode(&object[..15])), (None, None));
     }

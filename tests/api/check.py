@@ -134,6 +134,10 @@ def check(document, path, method, operation, state):
         received = [l["id"] for l in vehicle["labels"] if l["exemplar"]["state"] == "received"]
         expect(received, "the surface has no image to read")
         requested = requested.replace("{file}", f"{received[0]}.webp")
+    if path.endswith("/floor/{file}"):
+        images = json.loads(ask("GET", f"/api/v2/vehicles/{vehicle['id']}/floor")[2])["images"]
+        expect(images, "the surface has no image of the sea floor to read")
+        requested = images[-1]["url"]
     name = operation["operationId"]
     good = next(status for status in operation["responses"] if status != "default")
     content = operation["responses"][good].get("content", {})

@@ -139,6 +139,8 @@ fn orders_are_followed_until_applied_or_refused() {
         assert!(status.contains(word), "{word} is missing in {status}");
     }
     assert!(text(&ctl(port, &["labels"])).contains("-0.75"));
+    let floor = || state(port).is_some_and(|state| state["vehicles"][0]["floor"]["images"].as_u64() > Some(0));
+    wait_until("an image of the sea floor", floor);
     if let Some(python) = python("jsonschema, openapi_spec_validator, prometheus_client") {
         run_script(&python, "tests/api/check.py", &[&format!("http://127.0.0.1:{port}")]);
     }

@@ -118,7 +118,6 @@ impl VehicleRecord {
     /// The vehicle has begun another run, with a map of its own.
     pub fn begin_run(&mut self) {
         self.run += 1;
-        self.floor = FloorViews::default();
         self.labels.begin_run();
     }
 
@@ -218,6 +217,7 @@ impl VehicleRecord {
         self.restored = RestoredContact::default();
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
+            self.floor.follow(status.epoch);
             self.orders.begin_epoch(status.epoch);
             self.exemplars = ExemplarCache::default();
             self.annotations.handle_epoch();

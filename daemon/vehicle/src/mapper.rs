@@ -18,6 +18,7 @@ use scenecast_config::{BirthRule, Config, SceneLabels, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Registration, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LabelTree};
+use scenecast_protocol::schedule::BackgroundStream;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -56,7 +57,8 @@ pub struct Mapper {
     pub(super) habitats: Option<Habitats>,
     pub(super) book: LabelBook,
     pub(super) exemplars: Exemplars,
-    mosaic: Mosaic,
+    /// `None` if the configuration sends no image of the sea floor.
+    mosaic: Option<Mosaic>,
     pub(super) cells: Cells,
     pub(super) placer: FramePlacer,
     scales: LayerScales,
@@ -201,7 +203,7 @@ impl Mapper {
             habitats: (config.scene.labels == SceneLabels::Habitats).then(|| Habitats::new(config.scene.max_labels)),
             book: LabelBook::new(epoch),
             exemplars: Exemplars::new(config.camera.metres_per_pixel),
-            mosaic: Mosaic::default(),
+            mosaic: config.link.background.has(BackgroundStream::Floor).then(Mosaic::default),
             cells: Cells::default(),
             placer: FramePlacer::new(config),
             scales: LayerScales::new(config),
@@ -245,7 +247,9 @@ impl Mapper {
         }
         let (words, even) = self.words.extract(image, cell_px);
         let (size, cell_m) = (image.dimensions(), self.cell_m);
-        self.mosaic.add(&even, |words| projection.project(size, &pose, words), cell_m, t_s);
+        if let Some(mosaic) = &mut self.mosaic {
+            mosaic.add(&even, |words| projection.project(size, &pose, words), cell_m, t_s);
+        }
         let observations = projection.project(image.dimensions(), &pose, &words);
         self.online.expect(observations.len(), &mut self.model);
         self.model.insert(t_s, &observations);
@@ -290,7 +294,8 @@ impl Mapper {
         let changes = self.cells.take(&published, t_s, &self.scales);
         let cells = changes.labels.iter().map(|shown| (Cell::new(shown.x, shown.y), shown.label)).collect();
         let frame = Some(self.seen_frame(&changes, t_s, camera));
-        let floor = self.mosaic.poll_settled(self.cell_m, t_s);
+        let settled = self.mosaic.as_mut().map(|mosaic| mosaic.poll_settled(self.cell_m, t_s));
+        let floor = settled.unwrap_or_default();
         MapChanges { labels: Some(self.labelled(cells)), frame, floor, ..changes.into() }
     }
 

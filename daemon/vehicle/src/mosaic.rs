@@ -14,7 +14,7 @@ pub const TILE_PX: u32 = 128;
 /// Tiles that are kept, 64 kB each; of more, those that were out of view for the longest time are dropped.
 const MAX_TILES: usize = 512;
 /// Tiles that a frame changes at most: one that seems to see more has no sound geometry.
-const MAX_IN_VIEW: i64 = 400;
+const MAX_IN_VIEW: f64 = 100.0;
 /// A tile is given out once it was out of view for this time, seconds; sooner, the next frame would change it.
 const SETTLED_S: f64 = 10.0;
 /// The part of a tile that has to be seen, and that has to be new since it was given out last.
@@ -40,6 +40,8 @@ pub struct FloorTile {
     pub at: TilePlace,
     /// [`TILE_PX`] square. Pixels that no frame has shown have the mean colour of the others.
     pub picture: Arc<RgbImage>,
+    /// Pixels that a frame has shown.
+    pub seen: u32,
     /// The middle in the map frame, metres east and north.
     pub middle_m: (f64, f64),
     pub width_m: f64,
@@ -73,6 +75,21 @@ impl Tile {
 
     fn seen(&self) -> usize {
         self.near.iter().filter(|near| **near > 0).count()
+    }
+
+    /// The picture, if enough of it is new since it was given out last.
+    fn give(&mut self, at: TilePlace, width_m: f64) -> Option<FloorTile> {
+        if !std::mem::take(&mut self.is_changed) {
+            return None;
+        }
+        let (seen, all) = (self.seen(), f64::from(TILE_PX * TILE_PX));
+        if (seen as f64) < LEAST_SEEN * all || (seen.saturating_sub(self.given) as f64) < LEAST_NEW * all {
+            return None;
+        }
+        self.given = seen;
+        let middle = |index: i32| (f64::from(index) + 0.5) * width_m;
+        let (middle_m, picture) = ((middle(at.0), middle(at.1)), self.filled().into());
+        Some(FloorTile { at, picture, seen: seen as u32, middle_m, width_m, t_s: self.seen_s })
     }
 
     /// The picture without holes.
@@ -148,8 +165,11 @@ impl Mosaic {
     /// Adds a frame of mission time `t_s`, of which `project` puts pixels on the map with cells of `cell_m`.
     pub fn add(&mut self, frame: &RgbImage, project: impl Fn(&[Word]) -> Vec<Observation>, cell_m: f64, t_s: f64) {
         let Some(lie) = Lie::of(frame.dimensions(), &project) else { return };
-        let edge_m = f64::from(TILE_CELLS) * cell_m;
         let (east_m, north_m) = lie.reach_m();
+        let edge_m = f64::from(TILE_CELLS) * cell_m;
+        if (2.0 * east_m / edge_m + 1.0) * (2.0 * north_m / edge_m + 1.0) > MAX_IN_VIEW {
+            return;
+        }
         // What a frame shows better than one from about the same place is not worth the time.
         let is_near = |(x, y): (f64, f64)| (x - lie.place.0).hypot(y - lie.place.1) < LEAST_STEP * east_m.min(north_m);
         if self.last.is_some_and(|(place, last_s)| is_near(place) && (t_s - last_s).abs() < SETTLED_S / 2.0) {
@@ -161,9 +181,6 @@ impl Mosaic {
             (tile(at - reach) as i64, tile(at + reach) as i64)
         };
         let (columns, rows) = (span(lie.place.0, east_m), span(lie.place.1, north_m));
-        if (columns.1 - columns.0 + 1).saturating_mul(rows.1 - rows.0 + 1) > MAX_IN_VIEW {
-            return;
-        }
         for at in
             (rows.0..=rows.1).flat_map(|row| (columns.0..=columns.1).map(move |column| (column as i32, row as i32)))
         {
@@ -227,23 +244,16 @@ impl Mosaic {
 
     /// The tiles that have settled at mission time `t_s` and have enough that is new.
     pub fn poll_settled(&mut self, cell_m: f64, t_s: f64) -> Vec<FloorTile> {
-        let all = f64::from(TILE_PX * TILE_PX);
         let width_m = f64::from(TILE_CELLS) * cell_m;
         let mut settled = Vec::new();
-        for (at, tile) in self.tiles.iter_mut().filter(|(_, tile)| tile.is_changed && t_s - tile.seen_s >= SETTLED_S) {
-            tile.is_changed = false;
-            let seen = tile.seen();
-            if (seen as f64) < LEAST_SEEN * all || ((seen - tile.given.min(seen)) as f64) < LEAST_NEW * all {
-                continue;
-            }
-            tile.given = seen;
-            let middle = |index: i32| (f64::from(index) + 0.5) * width_m;
-            let (middle_m, picture) = ((middle(at.0), middle(at.1)), tile.filled().into());
-            settled.push(FloorTile { at: *at, picture, middle_m, width_m, t_s: tile.seen_s });
+        for (at, tile) in self.tiles.iter_mut().filter(|(_, tile)| t_s - tile.seen_s >= SETTLED_S) {
+            settled.extend(tile.give(*at, width_m));
         }
         while self.tiles.len() > MAX_TILES {
             let oldest = self.tiles.iter().min_by(|a, b| a.1.seen_s.total_cmp(&b.1.seen_s)).map(|(at, _)| *at);
-            oldest.map(|at| self.tiles.remove(&at));
+            let Some((at, mut tile)) = oldest.and_then(|at| Some((at, self.tiles.remove(&at)?))) else { break };
+            // A camera that sees little at a time fills all of them before any has settled.
+            settled.extend(tile.give(at, width_m));
         }
         settled
     }
@@ -252,7 +262,9 @@ impl Mosaic {
 /// The mean colour of a square of pixels around a point of a frame; `None` beyond its edge.
 fn mean_around(frame: &RgbImage, (u, v): (f64, f64), edge: i64) -> Option<Rgb<u8>> {
     let (width, height) = (i64::from(frame.width()), i64::from(frame.height()));
-    let (left, top) = ((u - edge as f64 / 2.0).round() as i64, (v - edge as f64 / 2.0).round() as i64);
+    // Far beyond the edge, there is no pixel.
+    let first = |at: f64| (at - edge as f64 / 2.0).round().clamp(-1e6, 1e6) as i64;
+    let (left, top) = (first(u), first(v));
     let (mut sum, mut pixels) = ([0_u32; 3], 0);
     for y in top.max(0)..(top + edge).min(height) {
         for x in left.max(0)..(left + edge).min(width) {

@@ -33,8 +33,8 @@ pub enum Mismatch {
     Unverified,
     /// Only at the surface: many frames from its address do not verify, and none does.
     #[error(
-        "its frames do not verify here: another surface holds it, or link.key_file, link.authenticate or mission.id differ \
-         between the ends"
+        "its frames do not verify here: they are of before a restart, another surface holds it, or link.key_file, link.authenticate \
+         or mission.id differ between the ends"
     )]
     Foreign,
     /// Its frames have up to so many bytes, and those of this end another number. They are read all the same.

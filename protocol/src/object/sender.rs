@@ -85,6 +85,12 @@ impl ObjectSender {
         self.objects.iter().all(|o| o.priority == Priority::Last)
     }
 
+    /// Whether those that are sent after all other content are the only ones that wait for spare capacity.
+    pub fn waits_only_with_last(&self) -> bool {
+        let mut waiting = self.objects.iter().filter(|o| o.is_background() && o.backlog_bytes() > 0);
+        waiting.all(|o| o.priority == Priority::Last)
+    }
+
     /// Whether the peer is known to have every object that has a share.
     pub fn has_only_background(&self) -> bool {
         self.objects.iter().all(OutgoingObject::is_background)

@@ -25,7 +25,7 @@ export class Mission {
     this.loss = 0.1;
     this.budgetBps = 10000;
     this.shares = { directive: 10, status: 5, fix: 5, map: 50, exemplar: 20 };
-    this.background = ["finer", "depth", "exemplars", "confidence"];
+    this.background = ["finer", "depth", "exemplars", "confidence", "floor"];
     this.layers = false;
     this.ended = false;
     this.truth = false;

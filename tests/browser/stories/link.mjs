@@ -115,7 +115,7 @@ export default [
       await box.getByRole("button", { name: "Earlier: images of new labels" }).click();
       await box.getByRole("button", { name: "Earlier: images of new labels" }).click();
       await box.getByRole("checkbox", { name: "confidence" }).uncheck();
-      const wanted = ["exemplars", "finer", "depth"];
+      const wanted = ["exemplars", "finer", "depth", "floor"];
       await s.until("the server's order", async () => (await s.get("/state")).link.background.join() === wanted.join());
       // The new state may arrive before the event of the request.
       await s.until("the message", () => s.posts.at(-1)?.body.background?.length === wanted.length);

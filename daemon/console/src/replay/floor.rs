@@ -3,38 +3,54 @@
 use super::Replay;
 use scenecast_messages::scenecast_msgs::Exemplar;
 use scenecast_surface::FloorPlace;
-use scenecast_surface::state::{FloorImage, FloorList};
+use scenecast_surface::state::{FloorImage, FloorList, FloorSummary};
+use std::collections::BTreeMap;
+
+/// The images that had arrived on the map of that moment, the latest of each place, with the numbers of their arrival.
+type Held<'a> = BTreeMap<FloorPlace, (u64, &'a Exemplar)>;
 
 impl Replay {
-    /// Those that had arrived, in the order of arrival.
-    fn floor_so_far(&self, part: &str) -> &[(u64, Exemplar)] {
-        let all = self.recording.operator.get(part).map_or(&[][..], |known| &known.floor);
-        &all[..all.partition_point(|(at, _)| *at <= self.at)]
+    fn floor_held(&self, part: &str) -> Held<'_> {
+        let Some(known) = self.recording.operator.get(part) else { return Held::new() };
+        let epoch = u32::from(known.map.shown().epoch);
+        let begin = self.recording.timeline.span.0;
+        let so_far = known.floor.iter().take_while(|(at, _)| *at <= self.at).filter(|(_, view)| view.epoch == epoch);
+        // Microseconds are whole numbers for every reader.
+        so_far.map(|(at, view)| (place_of(view), (1 + at.saturating_sub(begin) / 1000, view))).collect()
     }
 
     /// The latest image with this middle.
     pub(super) fn floor_image(&self, part: &str, place: FloorPlace) -> Option<&Exemplar> {
-        let mut latest = self.floor_so_far(part).iter().rev().map(|(_, view)| view);
-        latest.find(|view| place_of(view) == place)
+        self.floor_held(part).get(&place).map(|(_, view)| *view)
     }
 
-    /// The images after the first `since` of a vehicle.
+    /// How many there are.
+    pub(super) fn floor_summary(&self, part: &str) -> FloorSummary {
+        let held = self.floor_held(part);
+        FloorSummary {
+            images: held.len(),
+            bytes: held.values().map(|(_, view)| view.data.len()).sum(),
+            version: held.values().map(|(number, _)| *number).max().unwrap_or_default(),
+            epoch: held.values().next().map_or(0, |(_, view)| view.epoch as u8),
+        }
+    }
+
+    /// The images of a vehicle with a number above `since`.
     pub(super) fn floor(&self, id: u8, part: &str, since: u64) -> FloorList {
-        let held = self.floor_so_far(part);
         let mission_s = |nanos: i64| self.recording.timeline.mission_s(nanos.max(0) as u64);
-        let image = |view: &Exemplar| {
-            let ((east_dm, north_dm), received) = (place_of(view), view.header.stamp.nanos());
-            FloorImage {
-                url: format!("/api/v2/vehicles/{id}/floor/{east_dm}_{north_dm}.webp?received={received}"),
-                x_m: view.middle.x,
-                y_m: view.middle.y,
-                width_m: view.width_m,
-                at_s: mission_s(received),
-                taken_s: (view.taken.nanos() != 0).then(|| mission_s(view.taken.nanos())),
-            }
+        let image = |((east_dm, north_dm), number, view): (FloorPlace, u64, &Exemplar)| FloorImage {
+            url: format!("/api/v2/vehicles/{id}/floor/{east_dm}_{north_dm}.webp?number={number}"),
+            x_m: view.middle.x,
+            y_m: view.middle.y,
+            width_m: view.width_m,
+            at_s: mission_s(view.header.stamp.nanos()),
+            taken_s: (view.taken.nanos() != 0).then(|| mission_s(view.taken.nanos())),
         };
-        let images = held.iter().skip(since as usize).map(|(_, view)| image(view)).collect();
-        FloorList { version: held.len() as u64, images }
+        let held = self.floor_held(part).into_iter().map(|(place, (number, view))| (place, number, view));
+        let mut news: Vec<_> = held.filter(|(_, number, _)| *number > since).collect();
+        news.sort_by_key(|(_, number, _)| *number);
+        let version = news.last().map_or(since, |(_, number, _)| *number);
+        FloorList { version, images: news.into_iter().map(image).collect() }
     }
 }
 

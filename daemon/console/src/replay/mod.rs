@@ -165,6 +165,7 @@ impl Replay {
         vehicle.map.version = maps.map_or(0, |maps| maps.version);
         // It is the map of the run that was recorded.
         vehicle.map.earlier = None;
+        vehicle.floor = self.floor_summary(&part);
         if let Some(heard) = self.recording.operator.get(&part).and_then(|known| last_upto(&known.heard, self.at)) {
             let heard_s = self.recording.timeline.mission_s(heard);
             vehicle.last_received_s = Some(vehicle.last_received_s.map_or(heard_s, |before| before.max(heard_s)));

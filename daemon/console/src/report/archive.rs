@@ -111,6 +111,16 @@ impl Dive {
             );
         }
         let header = ["file", "label", "class", "taken_utc", "received_utc", "east_m", "north_m", "width_m"];
-        archive.add_table(&format!("{folder}/images.csv"), &header, images)
+        archive.add_table(&format!("{folder}/images.csv"), &header, images)?;
+        let mut views = Vec::new();
+        for view in &vehicle.floor {
+            let (east, north) = (format!("{:.1}", view.middle.x), format!("{:.1}", view.middle.y));
+            let name = format!("floor/{east}_{north}.{}", view.format);
+            archive.add(&format!("{folder}/{name}"), &view.data)?;
+            let taken = words::taken(view).unwrap_or_default();
+            views.push(vec![name, taken, east, north, format!("{:.3}", view.width_m)]);
+        }
+        let header = ["file", "taken_utc", "east_on_map_m", "north_on_map_m", "width_m"];
+        archive.add_table(&format!("{folder}/floor.csv"), &header, views)
     }
 }

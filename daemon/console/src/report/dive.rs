@@ -66,6 +66,10 @@ pub(super) struct DiveVehicle {
     pub(super) exemplars: Vec<(f64, Exemplar)>,
     pub(super) link: Vec<(f64, Link)>,
     pub(super) maps: Vec<MapsAt>,
+    /// Whether the surface knew it to go to a place that was ordered, at each state that it recorded.
+    pub(super) goes_to_place: Vec<(f64, bool)>,
+    /// The images of the sea floor that it has sent on this map, the latest of each place.
+    pub(super) floor: Vec<Exemplar>,
 }
 
 /// The operator's map of a vehicle at the end.

@@ -128,6 +128,12 @@ impl DiveVehicle {
         applied
     }
 
+    /// When the surface learned that the vehicle goes to no place any more, in a span.
+    fn destination_ended_s(&self, (from_s, to_s): (f64, f64)) -> Option<f64> {
+        let states = self.goes_to_place.iter().skip_while(|(at_s, goes)| *at_s < from_s || !goes);
+        states.take_while(|(at_s, _)| *at_s <= to_s).find(|(_, goes)| !goes).map(|(at_s, _)| *at_s)
+    }
+
     /// The share of the cells of its map that have one of these labels.
     fn share_of_map(&self, labels: &BTreeSet<u8>) -> String {
         let theirs = self.map.labels.iter().filter(|(_, label)| labels.contains(label)).count();
@@ -152,9 +158,14 @@ impl Dive {
         let mut effects = Vec::new();
         for slot in [SlotId::Utility, SlotId::Areas, SlotId::Destination, SlotId::Fence, SlotId::Constraints] {
             let applied = vehicle.applied(slot.name());
-            let ends = applied.iter().skip(1).map(|(at_s, _)| *at_s).chain([ended_s]);
-            effects.extend(applied.iter().zip(ends).filter_map(|((from_s, order), to_s)| {
+            let ends =
+                applied.iter().skip(1).map(|(at_s, _)| *at_s).chain([f64::INFINITY]).map(|at_s| at_s.min(ended_s));
+            let applied_in_time = applied.iter().zip(ends).filter(|((from_s, _), to_s)| from_s < to_s);
+            effects.extend(applied_in_time.filter_map(|((from_s, order), to_s)| {
                 let aim = Aim::of(slot.name(), &vehicle.given.get(*order)?.content)?;
+                // Labels of an earlier map mean something else.
+                let is_of_map = !matches!(aim, Aim::Labels(..)) || vehicle.has_one_map();
+                let aim = Some(aim).filter(|_| is_of_map)?;
                 let way = Way { dive: self, state, vehicle, span_s: (*from_s, to_s) };
                 let (told, to_s) = way.effect(&aim)?;
                 Some(Effect { order, from_s: *from_s, to_s, told })
@@ -288,7 +299,19 @@ impl Way<'_> {
                 ),
                 at_s,
             ),
-            None => (format!("it did not arrive; at the nearest it was {nearest_m:.1} m away"), self.span_s.1),
+            None => match self.vehicle.destination_ended_s(self.span_s) {
+                Some(at_s) => {
+                    let nearest = format!("its nearest known place is {nearest_m:.1} m away");
+                    (
+                        format!("by {} it had ended the order, as it does where it arrives; {nearest}", utc_text(at_s)),
+                        at_s,
+                    )
+                }
+                None => (
+                    format!("it did not arrive, as far as its places tell; the nearest is {nearest_m:.1} m away"),
+                    self.span_s.1,
+                ),
+            },
         })
     }
 
@@ -376,7 +399,7 @@ mod tests {
         let page = told(&[("destination", 2, r#"{"place": [14.5, 0.5]}"#)]);
         assert!(page.contains("00:00:11Z</td><td>it arrived (to 3 m) 10 s after the order was applied"), "{page}");
         let page = told(&[("destination", 2, r#"{"place": [15, 9]}"#)]);
-        assert!(page.contains("it did not arrive; at the nearest it was 8.5 m away"), "{page}");
+        assert!(page.contains("it did not arrive, as far as its places tell; the nearest is 8.5 m away"), "{page}");
     }
 
     #[test]

@@ -177,7 +177,12 @@ impl Dive {
         };
         match class {
             "map" => cells(sum(|vehicle| vehicle.map.labels.explored())),
-            "exemplar" => each(sum(|vehicle| vehicle.exemplars.len()), "image", "images", "each"),
+            "exemplar" => {
+                let of_labels = counted(sum(|vehicle| vehicle.exemplars.len()), "image of a label", "images of labels");
+                let floor = sum(|vehicle| vehicle.floor.len());
+                let of_floor = counted(floor, "image of the sea floor", "images of the sea floor");
+                format!("{of_labels}, {of_floor}, without those that later ones replaced")
+            }
             "status" => each(
                 sum(|vehicle| vehicle.track.len()),
                 "reported place",

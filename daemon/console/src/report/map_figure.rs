@@ -51,7 +51,7 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area
 }
 
 /// The part of the world that a figure shows, metres, and its scale.
-struct Frame {
+pub(super) struct Frame {
     west: f64,
     south: f64,
     east: f64,
@@ -61,7 +61,7 @@ struct Frame {
 
 impl Frame {
     /// The map, and places within its own size around it: one that is far away must not make the map small.
-    fn around(
+    pub(super) fn around(
         Rect { x, y, width, height }: Rect,
         cell_m: f64,
         (east_m, north_m): (f64, f64),
@@ -87,12 +87,17 @@ impl Frame {
         Self { west, south, east, north, px_m: WIDTH / (east - west) }
     }
 
-    fn height_px(&self) -> f64 {
+    pub(super) fn height_px(&self) -> f64 {
         (self.north - self.south) * self.px_m
     }
 
-    fn place(&self, east_m: f64, north_m: f64) -> (f64, f64) {
+    pub(super) fn place(&self, east_m: f64, north_m: f64) -> (f64, f64) {
         ((east_m - self.west) * self.px_m, (self.north - north_m) * self.px_m)
+    }
+
+    /// Pixels of a metre.
+    pub(super) fn px_m(&self) -> f64 {
+        self.px_m
     }
 
     /// A round length of about a fifth of the width, metres.
@@ -136,7 +141,7 @@ fn cells(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &
     }
 }
 
-fn grid(svg: &mut String, frame: &Frame) {
+pub(super) fn grid(svg: &mut String, frame: &Frame) {
     let step = frame.step_m();
     let height = frame.height_px();
     let lines = |from: f64, to: f64| {
@@ -323,7 +328,7 @@ fn wide_places(classes: &[u8], width: usize, least_room: u32, apart: f64) -> Vec
     found.into_iter().flat_map(|(class, places)| places.into_iter().map(move |place| (class, place))).collect()
 }
 
-fn scale(svg: &mut String, frame: &Frame) {
+pub(super) fn scale(svg: &mut String, frame: &Frame) {
     let (length, y) = (frame.step_m(), frame.height_px() + 28.0);
     let (end, right) = (10.0 + length * frame.px_m, WIDTH - 14.0);
     let _ = writeln!(

@@ -7,6 +7,7 @@ mod dive;
 mod doubts;
 mod effects;
 mod extent;
+mod floor_figure;
 mod frames;
 mod gaps;
 mod images;

@@ -54,9 +54,9 @@ impl DiveVehicle {
     fn images_received(&self, order: &OrderKey, given_s: f64) -> String {
         let labels = self.labels_of_images(order).unwrap_or_default();
         let is_asked = |image: &Exemplar| image.requested && labels.contains(&image.label.into());
-        let mut arrived = self.exemplars.iter().filter(|(at_s, image)| *at_s >= given_s && is_asked(image));
-        let first = arrived.next().map(|(at_s, _)| format!("; image received {}", utc_text(*at_s)));
-        first.unwrap_or_default()
+        let arrived = self.exemplars.iter().filter(|(at_s, image)| *at_s >= given_s && is_asked(image));
+        let first = arrived.map(|(at_s, _)| *at_s).reduce(f64::min);
+        first.map_or_else(String::new, |at_s| format!("; image received {}", utc_text(at_s)))
     }
 
     /// Why an order that has no end has none, as far as a later one of its kind tells it.

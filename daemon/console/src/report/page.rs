@@ -132,6 +132,7 @@ impl Dive {
                 }
             );
         }
+        self.floor_figure(page, state, vehicle);
         classes(page, self, state, vehicle);
         notes(page, self, state);
         self.orders_table(page, state, vehicle);

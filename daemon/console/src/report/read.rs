@@ -104,6 +104,7 @@ impl DiveVehicle {
             let (east_m, north_m) = (point.east_m + shift.0, point.north_m + shift.1);
             TrackPoint { at_s: seconds(*at), east_m, north_m, ..point }
         };
+        let goes_to_place = timeline.states.iter().filter_map(|text| goes_to_place(text, state.id)).collect();
         let known = operator.get_mut(part)?;
         known.map.seek(u64::MAX, |nanos| timeline.mission_time(nanos));
         let shown = known.map.shown();
@@ -138,10 +139,15 @@ impl DiveVehicle {
             }),
             restarts_s: another_runs(&recording.log, &state.name),
             mission_speed,
+            goes_to_place,
             link: known.link.iter().map(|(at, link)| (seconds(*at), link.clone())).collect(),
             maps,
             ..Self::default()
         };
+        let floor = known.floor.iter().filter(|(_, view)| view.epoch == u32::from(shown.epoch));
+        let middle = |view: &Exemplar| ((view.middle.x * 10.0).round() as i32, (view.middle.y * 10.0).round() as i32);
+        let latest: BTreeMap<_, _> = floor.map(|(_, view)| (middle(view), view)).collect();
+        vehicle.floor = latest.into_values().cloned().collect();
         // Of an earlier epoch, their numbers mean something else.
         let is_current = |exemplar: &Exemplar| exemplar.epoch == u32::from(shown.epoch);
         let exemplars = known.exemplars.iter().filter(|(_, exemplar)| is_current(exemplar));
@@ -152,8 +158,9 @@ impl DiveVehicle {
             match vehicle.exemplars.iter_mut().find(|(_, other)| number(other) == number(exemplar)) {
                 // A larger one takes the place of a smaller one, and the same one when somebody asked for it. A surface that was
                 // restarted has recorded again what it knew.
-                Some(known) if known.1.data.len() < exemplar.data.len() || exemplar.requested && !known.1.requested => {
-                    *known = arrived;
+                Some(known) if known.1.data.len() < exemplar.data.len() => *known = arrived,
+                Some(known) if exemplar.requested && !known.1.requested => {
+                    (known.0, known.1.requested) = (arrived.0, true);
                 }
                 Some(_) => {}
                 None => vehicle.exemplars.push(arrived),
@@ -167,6 +174,22 @@ impl DiveVehicle {
         own.iter().flat_map(|own| &own.orders).for_each(|status| vehicle.take_decision(status));
         Some(vehicle)
     }
+}
+
+/// When a state was recorded, and whether a vehicle goes to a place that was ordered by it.
+fn goes_to_place(text: &StateText, id: u8) -> Option<(f64, bool)> {
+    #[derive(serde::Deserialize)]
+    struct State {
+        vehicles: Vec<Vehicle>,
+    }
+    #[derive(serde::Deserialize)]
+    struct Vehicle {
+        id: u8,
+        destination_in_force: Option<serde::de::IgnoredAny>,
+    }
+    let state: State = serde_json::from_str(&text.json).ok()?;
+    let vehicle = state.vehicles.into_iter().find(|vehicle| vehicle.id == id)?;
+    Some((seconds(text.nanos), vehicle.destination_in_force.is_some()))
 }
 
 /// The last that the record has of each process of the surface but the last, and the first state of the next.

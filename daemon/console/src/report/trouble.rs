@@ -5,7 +5,7 @@ use super::dive::{Dive, DiveVehicle};
 use super::{gaps, uncertainty, words};
 use scenecast_core::utc_text;
 use scenecast_messages::contents::valid_part;
-use scenecast_messages::scenecast_msgs::Event;
+use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::wire::{EquipmentFaults, ModeReason, VehicleMode};
 use scenecast_surface::state::VehicleState;
 use scenecast_surface::{AUTOPILOT_SILENT, LogKind, NO_FAULT};
@@ -46,6 +46,12 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         restart("the vehicle's", pause, told_of(set_back) + &uncertainty::lost(vehicle, pause))
     }));
     found.extend(gaps::told(dive, vehicle));
+    let refused = vehicle.orders_of_people().filter_map(|(order, way)| {
+        let last = way.last().filter(|last| last.status == OrderStatus::REFUSED)?;
+        let ordered = dive.ordered(state, vehicle, order).1;
+        Some((last.at_s, format!("the vehicle refused an order ({ordered}): {}", last.reason)))
+    });
+    found.extend(refused);
     found.extend(dive.not_sent(state).map(|event| {
         let (at_s, told) = told(event);
         (at_s, format!("the surface refused a request: {told}"))

@@ -111,8 +111,8 @@ struct RecordedVehicle {
     report_s: Option<f64>,
     /// Epoch, label, number and size of the images, and whether somebody asked for it: a larger one takes the place of one of the same number.
     exemplars: BTreeSet<(u8, u8, u8, u8, bool)>,
-    /// The number of the last view of the sea floor, and the run that it belongs to.
-    floor: (u32, u64),
+    /// The number of the last view of the sea floor.
+    floor: u64,
 }
 
 /// What a record has of a layer.
@@ -295,20 +295,21 @@ impl RecordedVehicle {
     /// Records the views of the sea floor that have come in, as images of no label.
     fn record_floor(&mut self, seen: Seen<'_>, entries: &mut Vec<RecordEntry>) {
         let Some(record) = seen.address().and_then(|address| seen.surface.record(address)) else { return };
-        let last = if self.floor.0 == record.run { self.floor.1 } else { 0 };
-        let news = record.floor.iter().filter(|(_, number, _)| *number > last);
+        let news = record.floor.iter().filter(|(_, number, _)| *number > self.floor);
         let mut news: Vec<_> = news.map(|(_, number, view)| (number, view)).collect();
         news.sort_by_key(|(number, _)| *number);
-        entries.extend(news.into_iter().map(|(_, view)| seen.entry("floor", &of_floor(seen, view))));
-        self.floor = (record.run, record.floor.version());
+        entries
+            .extend(news.into_iter().map(|(_, view)| seen.entry("floor", &of_floor(seen, record.floor.epoch(), view))));
+        self.floor = record.floor.version().max(self.floor);
     }
 }
 
 /// A view of the sea floor, which moves with the map.
-fn of_floor(seen: Seen<'_>, view: &StoredExemplar) -> Exemplar {
+fn of_floor(seen: Seen<'_>, epoch: u8, view: &StoredExemplar) -> Exemplar {
     let ((x, y), whole) = (view.view.middle_m(), picture(seen, view));
     Exemplar {
         header: Header { frame_id: MAP_FRAME.to_owned(), ..whole.header.clone() },
+        epoch: epoch.into(),
         middle: Point { x, y, z: f64::NAN },
         ..whole
     }

@@ -204,7 +204,7 @@ pub struct StoredIntent {
     pub settings_unsure: bool,
 }
 
-/// An image of a label, or a view of the sea floor, which has no number and is never requested.
+/// An image of a label, or a view of the sea floor, whose number is the part of it that was seen, in 63rds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredImage {
     pub number: u8,

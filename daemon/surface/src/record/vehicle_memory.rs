@@ -201,11 +201,12 @@ impl VehicleMemory {
         all
     }
 
-    /// The map of the run with everything that belongs to it, for the archive.
+    /// The map of the run with everything that belongs to it but the views of the sea floor, for the archive.
     pub(crate) fn archive(&self, ended_us: u64) -> Vec<VehicleEvent> {
         let cells = self.map.explored() as u64;
         let head = [VehicleEvent::Archived { ended_us, cells }, VehicleEvent::Named(self.name.clone())];
-        head.into_iter().chain(self.run_events()).collect()
+        let is_floor = |event: &VehicleEvent| matches!(event, VehicleEvent::Floor(_));
+        head.into_iter().chain(self.run_events().into_iter().filter(|event| !is_floor(event))).collect()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{command, stored};
 use crate::Surface;
 use crate::exemplar_cache::ExemplarCache;
+use crate::floor_views::FloorViews;
 use crate::record::{StoredBudget, SurfaceMemory, VehicleMemory};
 use crate::track::{RegistrationRecord, Track};
 use crate::vehicle_record::VehicleRecord;
@@ -66,6 +67,7 @@ fn restore_record(record: &mut VehicleRecord, memory: &VehicleMemory) {
         exemplars.restore_request(label, *serial, open.as_ref().map(|open| stored::open_request(label, open)));
     }
     record.exemplars = exemplars;
+    record.floor = FloorViews::of_epoch(memory.id.epoch);
     let mut floor: Vec<_> = memory.images.floor.values().map(stored::exemplar).collect();
     floor.sort_by_key(|view| view.received);
     floor.into_iter().for_each(|view| record.floor.insert(view));

@@ -75,7 +75,7 @@ pub(super) fn describe(
 /// The name, the colour and the merging of a label, as an edit leaves them.
 fn label(order: &LabelOrder) -> String {
     let name = order.name.as_ref().map(|name| format!("name {name}"));
-    let name = name.or_else(|| order.merged_into.is_none().then(|| "no name".to_owned()));
+    let name = name.or_else(|| order.merged_into.is_none().then(|| "no name, not merged".to_owned()));
     let colour = order.colour.as_ref().map(|colour| format!("colour {colour}"));
     let merged = order.merged_into.map(|into| format!("merged into label {into}"));
     let all: Vec<String> = [name, colour, merged].into_iter().flatten().collect();

@@ -49,6 +49,7 @@ fn vehicle(
             images: record.floor.count(),
             bytes: record.floor.bytes(),
             version: record.floor.version(),
+            epoch: record.floor.epoch(),
         },
         link: link::channel(&view, now),
         usbl: record.found.as_ref().map(|(line, at)| UsblMeasurement {

@@ -76,8 +76,10 @@ pub struct FloorSummary {
     pub images: usize,
     /// The bytes of all.
     pub bytes: usize,
-    /// A number that grows with each image that arrives; it is lower again in another run of the vehicle.
+    /// The number of the last image that arrived: microseconds of mission time.
     pub version: u64,
+    /// The epoch of the map that they lie on; of another one there are none any more.
+    pub epoch: u8,
 }
 
 /// The images of the sea floor that have arrived, or those after a version.

@@ -2,7 +2,7 @@
 
 use super::evidence::FrameClock;
 use crate::exemplar::{GOOD_SSIM, compress_to};
-use crate::mosaic::{FloorTile, TilePlace};
+use crate::mosaic::{FloorTile, TILE_PX, TilePlace};
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use scenecast_protocol::directive::Series;
@@ -12,10 +12,14 @@ use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::schedule::BackgroundStream;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
 
 /// Pictures in flight at a time: enough that the next one begins before the surface has told that it has the last one, and with all
 /// exemplars not more than the link takes.
 const MAX_IN_FLIGHT: usize = 6;
+/// One that is longer in flight is written again, as the times in it are told by the vehicle's clock, which wraps.
+const MAX_IN_FLIGHT_TIME: Duration = Duration::from_secs(30 * 60);
 /// The size class of a whole picture; class 0 is sent first.
 const WHOLE: u8 = 1;
 /// Tiles that are kept; of more, the oldest is dropped.
@@ -23,22 +27,26 @@ const MAX_TILES: usize = 4096;
 /// Of these, those with pixels, 50 kB each. The others are kept as they were sent.
 const MAX_PICTURES: usize = 512;
 
-/// The picture of a tile, as it is kept.
+/// The picture of a tile: its pixels until it was sent whole, and from then on what was sent.
 #[derive(Debug)]
-enum Kept {
-    /// It was not sent whole yet.
-    Picture(FloorTile),
-    /// As it was sent whole.
-    Sent(FloorView),
+enum Picture {
+    Pixels(Arc<RgbImage>),
+    Coded(Vec<u8>),
 }
 
 #[derive(Debug)]
 struct Tile {
-    kept: Kept,
     /// Counts the tiles, so that the oldest are known.
     serial: u64,
-    /// How many sizes the surface has, or are in flight.
-    sizes: u8,
+    picture: Picture,
+    middle_m: (f64, f64),
+    width_m: f64,
+    /// Mission time of the last frame in it, seconds.
+    t_s: f64,
+    /// Pixels that a frame has shown.
+    seen: u32,
+    /// The size class that is sent next; above [`WHOLE`], the surface has it whole, or that is in flight.
+    next: u8,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +55,7 @@ struct InFlight {
     serial: u64,
     size: u8,
     object: ObjectId,
+    since: Instant,
 }
 
 /// The tiles, and how much of each was sent.
@@ -60,16 +69,24 @@ pub(super) struct FloorPictures {
 }
 
 impl FloorPictures {
-    /// Takes new pictures, each of which replaces an earlier one of its tile.
-    pub(super) fn add(&mut self, tiles: &[FloorTile]) {
+    /// Takes new pictures, each of which replaces an earlier one of its tile of which no more was seen.
+    pub(super) fn add(&mut self, tiles: &[FloorTile], link: &mut VehicleLink) {
         for tile in tiles {
+            let known = self.tiles.get(&tile.at);
+            if known.is_some_and(|known| known.seen > tile.seen) {
+                continue;
+            }
+            // What the surface has whole must not become small again.
+            let next = if known.is_some_and(|known| known.next > WHOLE) { WHOLE } else { 0 };
+            self.withdraw(link, |in_flight| in_flight.at == tile.at);
             self.serial += 1;
-            let new = Tile { kept: Kept::Picture(tile.clone()), serial: self.serial, sizes: 0 };
-            self.tiles.insert(tile.at, new);
+            let FloorTile { at, middle_m, width_m, t_s, seen, .. } = *tile;
+            let picture = Picture::Pixels(tile.picture.clone());
+            self.tiles.insert(at, Tile { serial: self.serial, picture, middle_m, width_m, t_s, seen, next });
         }
-        let is_picture = |tile: &Tile| matches!(tile.kept, Kept::Picture(_));
-        while self.tiles.values().filter(|tile| is_picture(tile)).count() > MAX_PICTURES {
-            self.drop_oldest(is_picture);
+        let has_pixels = |tile: &Tile| matches!(tile.picture, Picture::Pixels(_));
+        while self.tiles.values().filter(|tile| has_pixels(tile)).count() > MAX_PICTURES {
+            self.drop_oldest(has_pixels);
         }
         while self.tiles.len() > MAX_TILES {
             self.drop_oldest(|_| true);
@@ -82,49 +99,51 @@ impl FloorPictures {
         oldest.map(|at| self.tiles.remove(&at));
     }
 
-    /// Sends the next pictures: every tile in its small size, the oldest first, then the whole ones, those with the greatest `weight` of
-    /// their tile and its middle first.
+    /// Sends the next pictures on the map of `epoch`: every tile in its small size, the newest first, then the whole ones, those with the
+    /// greatest `weight` of their tile and its middle first.
     pub(super) fn serve(
         &mut self,
+        epoch: u8,
         weight: impl Fn(TilePlace, (f64, f64)) -> f64,
         frames: &FrameClock,
         link: &mut VehicleLink,
         now: Instant,
     ) {
         self.follow(link.persistent_state().series());
-        if !link.background().has(BackgroundStream::Floor) {
-            return self.withdraw(link);
-        }
-        while self.in_flight.len() < MAX_IN_FLIGHT && link.background_object_bytes() < max_bytes(WHOLE) {
+        let is_listed = link.background().has(BackgroundStream::Floor);
+        self.withdraw(link, |in_flight| !is_listed || now.since(in_flight.since) > MAX_IN_FLIGHT_TIME);
+        while is_listed && self.in_flight.len() < MAX_IN_FLIGHT && link.background_object_bytes() < max_bytes(WHOLE) {
             let Some(at) = self.next(&weight) else { return };
             let Some(tile) = self.tiles.get_mut(&at) else { return };
-            let view = match &tile.kept {
-                Kept::Sent(view) => Some(view.clone()),
-                Kept::Picture(picture) => coded(picture, tile.sizes, frames, now),
-            };
-            tile.sizes += 1;
-            let Some(view) = view else { continue };
-            if view.size >= WHOLE {
-                (tile.kept, tile.sizes) = (Kept::Sent(view.clone()), WHOLE + 1);
-            }
+            let size = tile.next;
+            tile.next += 1;
+            let Some(view) = tile.view(epoch, size, frames, now) else { continue };
             let Some(object) = link.push_last_object(view.encode()) else { continue };
-            self.in_flight.push(InFlight { at, serial: tile.serial, size: view.size, object });
+            self.in_flight.push(InFlight { at, serial: tile.serial, size, object, since: now });
         }
     }
 
     /// Another surface has no picture yet.
     fn follow(&mut self, series: Option<Series>) {
         if self.series.is_some() && series != self.series {
-            self.tiles.values_mut().for_each(|tile| tile.sizes = 0);
+            self.send_all_again();
         }
         self.series = series;
     }
 
+    fn send_all_again(&mut self) {
+        for tile in self.tiles.values_mut() {
+            tile.next = if matches!(tile.picture, Picture::Coded(_)) { WHOLE } else { 0 };
+        }
+    }
+
     fn next(&self, weight: impl Fn(TilePlace, (f64, f64)) -> f64) -> Option<TilePlace> {
-        let small = self.tiles.iter().filter(|(_, tile)| tile.sizes == 0).min_by_key(|(_, tile)| tile.serial);
+        // Two sizes of one tile might arrive in the other order.
+        let is_free = |at: &TilePlace| !self.in_flight.iter().any(|in_flight| in_flight.at == *at);
+        let of_size = |size: u8| self.tiles.iter().filter(move |(at, tile)| tile.next == size && is_free(at));
+        let small = of_size(0).max_by_key(|(_, tile)| tile.serial);
         let whole = || {
-            let open = self.tiles.iter().filter(|(_, tile)| tile.sizes == WHOLE);
-            let weighed = open.map(|(at, tile)| (weight(*at, tile.kept.middle_m()), tile.serial, at));
+            let weighed = of_size(WHOLE).map(|(at, tile)| (weight(*at, tile.middle_m), tile.serial, at));
             weighed.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).map(|(_, _, at)| at)
         };
         small.map(|(at, _)| at).or_else(whole).copied()
@@ -135,46 +154,60 @@ impl FloorPictures {
         self.in_flight.retain(|in_flight| in_flight.object != id);
     }
 
-    /// A new run of the link has begun, in which nothing is in flight.
+    /// A new run of the link has begun, in which nothing is in flight. What the surface has, it keeps.
     pub(super) fn handle_restart(&mut self, link: &mut VehicleLink) {
-        self.withdraw(link);
+        self.withdraw(link, |_| true);
     }
 
-    /// Stops what is in flight; it is sent again later.
-    fn withdraw(&mut self, link: &mut VehicleLink) {
-        for InFlight { at, serial, size, object } in std::mem::take(&mut self.in_flight) {
+    /// Another map has begun, on which the surface has no picture.
+    pub(super) fn begin_epoch(&mut self, link: &mut VehicleLink) {
+        self.withdraw(link, |_| true);
+        self.send_all_again();
+    }
+
+    /// Stops some of what is in flight; it is sent again later.
+    fn withdraw(&mut self, link: &mut VehicleLink, is_one: impl Fn(&InFlight) -> bool) {
+        let (gone, kept) = std::mem::take(&mut self.in_flight).into_iter().partition(is_one);
+        self.in_flight = kept;
+        let gone: Vec<InFlight> = gone;
+        for InFlight { at, serial, size, object, .. } in gone {
             link.cancel_object(object);
             if let Some(tile) = self.tiles.get_mut(&at).filter(|tile| tile.serial == serial) {
-                tile.sizes = tile.sizes.min(size);
+                tile.next = tile.next.min(size);
             }
         }
     }
 }
 
-impl Kept {
-    /// The middle in the map frame, metres east and north.
-    fn middle_m(&self) -> (f64, f64) {
-        match self {
-            Self::Picture(picture) => picture.middle_m,
-            Self::Sent(view) => view.view.middle_m(),
+impl Tile {
+    /// The picture in a size class; `None` if it cannot be compressed. Once it was compressed whole, its pixels are not kept.
+    fn view(&mut self, epoch: u8, size: u8, frames: &FrameClock, now: Instant) -> Option<FloorView> {
+        let (size, bytes) = match &self.picture {
+            Picture::Coded(bytes) => (WHOLE, bytes.clone()),
+            Picture::Pixels(pixels) => (size, coded(pixels, size)?),
+        };
+        if size == WHOLE {
+            self.picture = Picture::Coded(bytes.clone());
         }
+        let view = ExemplarView::new(self.width_m, self.middle_m, frames.taken(self.t_s), now);
+        let seen = (f64::from(self.seen) / f64::from(TILE_PX * TILE_PX) * f64::from(FloorView::WHOLE)).round();
+        let seen = (seen as u8).clamp(1, FloorView::WHOLE);
+        (view.width_mm > 0).then_some(FloorView { epoch, seen, size, view, bytes })
     }
 }
 
-/// The picture of a tile in a size class; `None` if it cannot be compressed.
-fn coded(tile: &FloorTile, size: u8, frames: &FrameClock, now: Instant) -> Option<FloorView> {
+/// The bytes of a picture in a size class; `None` if it cannot be compressed.
+fn coded(picture: &RgbImage, size: u8) -> Option<Vec<u8>> {
     let edge = edge_px(size);
     let smaller: RgbImage;
-    let picture = match tile.picture.width() == edge {
-        true => &*tile.picture,
+    let picture = match picture.width() == edge {
+        true => picture,
         false => {
-            smaller = resize(&*tile.picture, edge, edge, FilterType::Triangle);
+            smaller = resize(picture, edge, edge, FilterType::Triangle);
             &smaller
         }
     };
-    let bytes = compress_to(picture, GOOD_SSIM, max_bytes(size))?.bytes;
-    let view = ExemplarView::new(tile.width_m, tile.middle_m, frames.taken(tile.t_s), now);
-    (view.width_mm > 0).then_some(FloorView { size, view, bytes })
+    Some(compress_to(picture, GOOD_SSIM, max_bytes(size))?.bytes)
 }
 
 #[cfg(test)]
@@ -195,14 +228,14 @@ mod tests {
     fn tile(column: i32) -> FloorTile {
         let picture = RgbImage::from_fn(128, 128, |x, y| Rgb([(x * 2) as u8, (y * 2) as u8, column as u8]));
         let middle_m = (2.0 * f64::from(column) + 1.0, 1.0);
-        FloorTile { at: (column, 0), picture: picture.into(), middle_m, width_m: 2.0, t_s: 0.0 }
+        FloorTile { at: (column, 0), picture: picture.into(), seen: 128 * 128, middle_m, width_m: 2.0, t_s: 0.0 }
     }
 
     /// Column and size class of what is sent; the surface has each object at once.
     fn sent(floor: &mut FloorPictures, link: &mut VehicleLink) -> Vec<(i32, u8)> {
         let mut sent = Vec::new();
         loop {
-            floor.serve(|(column, _), _| f64::from(column), &FrameClock::default(), link, Instant::ZERO);
+            floor.serve(0, |(column, _), _| f64::from(column), &FrameClock::default(), link, Instant::ZERO);
             if floor.in_flight.is_empty() {
                 return sent;
             }
@@ -216,40 +249,55 @@ mod tests {
     #[test]
     fn every_tile_is_sent_small_before_any_is_sent_whole() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
-        floor.add(&[tile(3), tile(1), tile(2)]);
-        assert_eq!(sent(&mut floor, &mut link), [(3, 0), (1, 0), (2, 0), (3, 1), (2, 1), (1, 1)], "then by weight");
-        floor.add(&[tile(1)]);
-        assert_eq!(sent(&mut floor, &mut link), [(1, 0), (1, 1)], "more of it was seen");
+        floor.add(&[tile(3), tile(1), tile(2)], &mut link);
+        assert_eq!(
+            sent(&mut floor, &mut link),
+            [(2, 0), (1, 0), (3, 0), (3, 1), (2, 1), (1, 1)],
+            "the newest small ones, then by weight"
+        );
     }
 
     #[test]
-    fn what_was_in_flight_is_sent_again_after_a_restart_of_the_link() {
+    fn what_the_surface_has_whole_is_not_replaced_by_a_small_or_lesser_picture() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
-        floor.add(&[tile(1)]);
-        floor.serve(|_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
-        let object = floor.in_flight[0].object;
+        floor.add(&[FloorTile { seen: 9000, ..tile(1) }], &mut link);
+        assert_eq!(sent(&mut floor, &mut link), [(1, 0), (1, 1)]);
+        floor.add(&[FloorTile { seen: 6000, ..tile(1) }], &mut link);
+        assert_eq!(sent(&mut floor, &mut link), [], "less of it was seen");
+        floor.add(&[tile(1)], &mut link);
+        assert_eq!(sent(&mut floor, &mut link), [(1, 1)], "more of it was seen");
+    }
+
+    #[test]
+    fn what_was_in_flight_is_sent_again_after_a_restart_of_the_link_and_all_on_another_map() {
+        let (mut floor, mut link) = (FloorPictures::default(), link());
+        floor.add(&[tile(1), tile(2)], &mut link);
+        floor.serve(0, |_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        let sizes: Vec<u8> = floor.in_flight.iter().map(|in_flight| in_flight.size).collect();
+        assert_eq!(sizes, [0, 0], "a tile is in flight once at a time");
         floor.handle_restart(&mut link);
-        assert_eq!(sent(&mut floor, &mut link), [(1, 1)], "it was on its way whole");
-        floor.handle_delivered(object);
-        floor.tiles.values_mut().for_each(|tile| tile.sizes = 0);
-        assert_eq!(sent(&mut floor, &mut link), [(1, 1)], "another surface gets it whole at once");
+        assert_eq!(sent(&mut floor, &mut link), [(2, 0), (1, 0), (2, 1), (1, 1)]);
+        floor.handle_restart(&mut link);
+        assert_eq!(sent(&mut floor, &mut link), [], "the surface has all");
+        floor.begin_epoch(&mut link);
+        assert_eq!(sent(&mut floor, &mut link), [(2, 1), (1, 1)]);
     }
 
     #[test]
     fn no_more_is_in_flight_than_the_link_takes_and_nothing_unless_it_is_listed() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
-        floor.add(&(0..40).map(tile).collect::<Vec<_>>());
-        floor.serve(|_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        floor.add(&(0..40).map(tile).collect::<Vec<_>>(), &mut link);
+        floor.serve(0, |_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
         assert!((1..=MAX_IN_FLIGHT).contains(&floor.in_flight.len()));
         link.set_background(BackgroundOrder::new(&[BackgroundStream::Exemplars]).unwrap());
-        floor.serve(|_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
+        floor.serve(0, |_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
         assert_eq!((floor.in_flight.len(), link.background_object_bytes()), (0, 0));
     }
 
     #[test]
     fn the_newest_tiles_are_kept() {
-        let mut floor = FloorPictures::default();
-        floor.add(&(0..600).map(tile).collect::<Vec<_>>());
+        let (mut floor, mut link) = (FloorPictures::default(), link());
+        floor.add(&(0..600).map(tile).collect::<Vec<_>>(), &mut link);
         assert_eq!(floor.tiles.len(), MAX_PICTURES);
         assert!(!floor.tiles.contains_key(&(0, 0)) && floor.tiles.contains_key(&(599, 0)));
     }

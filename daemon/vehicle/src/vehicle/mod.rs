@@ -225,7 +225,7 @@ impl Vehicle {
     /// A producer has changed the map. New labels are stored before any of them is sent, so that a restart cannot give one
     /// another meaning. Returns the label whose name is refused, because it has another one already.
     pub fn handle_changes(&mut self, changes: &MapChanges, now: Instant) -> Option<u8> {
-        self.floor.add(&changes.floor);
+        self.floor.add(&changes.floor, &mut self.link);
         let is_more = changes.labels.as_ref().is_some_and(|labels| self.durable.claim(labels));
         if !self.storing.holds_changes(changes, now) {
             self.publish(changes, now);
@@ -259,7 +259,7 @@ impl Vehicle {
         self.publisher.begin_epoch(&mut self.link, now);
         self.weights = Weights::default();
         self.gallery = Gallery::default();
-        self.floor.handle_restart(&mut self.link);
+        self.floor.begin_epoch(&mut self.link);
         self.follow_utility();
         self.report_in_force(now);
     }
@@ -283,7 +283,7 @@ impl Vehicle {
             let of_place = guidance.steering().weight_of_place((place.east_m, place.north_m));
             cells_of_tile(at).map(|cell| weights.weight(map.get(cell)) + of_place).sum()
         };
-        floor.serve(weight, &publisher.frames(), link, now);
+        floor.serve(storing.epoch(), weight, &publisher.frames(), link, now);
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {

@@ -123,7 +123,7 @@ impl<S: StateSource> VehicleContent<S> {
         let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         let map = self.source.expected_backlog_bytes() + self.about_labels_backlog();
         // People do not wait for what is sent last.
-        let background = match self.objects.has_only_last() {
+        let background = match self.objects.waits_only_with_last() {
             true => self.background_backlog(budget, now).saturating_sub(self.objects.background_backlog_bytes()),
             false => self.background_backlog(budget, now),
         };

@@ -98,7 +98,7 @@ impl<S: StateSource> VehicleContent<S> {
         let finer = self.background.iter().position(|s| s == BackgroundStream::Finer).filter(|_| refining);
         let allowed = move |place: usize| spare || finer.is_some_and(|finer| place <= finer);
         let are_objects = |stream| matches!(stream, BackgroundStream::Exemplars | BackgroundStream::Floor);
-        let is_last = move |stream| are_objects(stream) && self.objects.has_only_last();
+        let is_last = move |stream| are_objects(stream) && self.objects.waits_only_with_last();
         let waits =
             move |&(place, stream): &(usize, BackgroundStream)| allowed(place) && self.waiting_bytes(stream) > 0;
         let in_order = move |last: bool| self.background.iter().enumerate().filter(move |&(_, s)| is_last(s) == last);

@@ -15,7 +15,7 @@ const NO_IMAGE = 70;
 /** The pause before images that could not be loaded are requested again. */
 const RETRY_MS = 10_000;
 
-/** What has arrived, by mission and vehicle: the version that was asked for, and the images by the tile of the map that has their middle. */
+/** What has arrived, by mission and vehicle: the number of the last image, and all of them by the tile of the map that has their middle. */
 const floors = new Map();
 
 const floorOf = (vehicle) => floors.get(`${store.snapshot.mission.id}.${vehicle.id}`);
@@ -26,31 +26,36 @@ export const hasFloor = () => isHere(store.vehicle);
 
 /** Loads the images that have arrived since the last call. */
 export function loadFloor(vehicle, map) {
-  if (!isHere(vehicle)) return;
   const key = `${store.snapshot.mission.id}.${vehicle.id}`;
+  const { images, version, epoch } = vehicle.floor ?? { images: 0 };
   const known = floors.get(key);
-  // Another run, or an earlier moment of a record, has other images.
-  const floor = known && vehicle.floor.version >= known.asked ? known : { asked: 0, version: 0, tiles: new Map(), newestS: null, isBusy: false };
+  // Another map, an earlier moment of a record, or images that the surface has dropped.
+  const isAnother = !known || known.epoch !== epoch || version < known.version || images < known.count;
+  if (isAnother) floors.delete(key);
+  if (images === 0) return;
+  const floor = isAnother ? { epoch, version: 0, count: 0, tiles: new Map(), newestS: null, isBusy: false } : known;
   floors.set(key, floor);
-  if (floor.isBusy || floor.asked === vehicle.floor.version) return;
+  if (floor.isBusy || floor.version >= version) return;
   floor.isBusy = true;
-  floor.asked = vehicle.floor.version;
-  load(floor, vehicle.id, EDGE * map.cell_m).then(() => (floor.isBusy = false), () => setTimeout(() => Object.assign(floor, { isBusy: false, asked: -1 }), RETRY_MS));
+  load(floor, vehicle.id, EDGE * map.cell_m).then(() => (floor.isBusy = false), () => setTimeout(() => (floor.isBusy = false), RETRY_MS));
 }
 
 async function load(floor, id, sideM) {
   const list = await readFloor(id, floor.version);
-  await Promise.allSettled(list.images.map(async (info) => {
+  const loaded = await Promise.allSettled(list.images.map(async (info) => {
     const picture = new Image();
     picture.src = info.url;
     await picture.decode();
-    const tile = [info.x_m, info.y_m].map((m) => Math.floor(m / sideM)).join();
+    const [tile, place] = [[info.x_m, info.y_m].map((m) => Math.floor(m / sideM)).join(), `${info.x_m},${info.y_m}`];
     if (!floor.tiles.has(tile)) floor.tiles.set(tile, new Map());
-    floor.tiles.get(tile).set(`${info.x_m},${info.y_m}`, { ...info, picture });
+    if (!floor.tiles.get(tile).has(place)) floor.count += 1;
+    floor.tiles.get(tile).set(place, { ...info, picture });
     floor.newestS = Math.max(floor.newestS ?? 0, info.at_s);
   }));
-  floor.version = list.version;
   store.emit("natural");
+  // The list is read again from where it was.
+  if (loaded.some((one) => one.status === "rejected")) throw new Error("an image of the sea floor could not be loaded");
+  floor.version = list.version;
 }
 
 /** [r, g, b, a] of a label under the images. */
