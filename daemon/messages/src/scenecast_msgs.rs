@@ -135,12 +135,12 @@ messages! {
         uint8 WITHDRAWN: u8 = 5;
     }
 
-    /// An image that shows one label.
+    /// An image that shows one label, or none: then a view of the sea floor with north up.
     message Exemplar {
         header: Header,
         vehicle: String,
         epoch: u32,
-        /// 1 to 254.
+        /// 1 to 254; 0 for a view of the sea floor.
         label: u8,
         /// The number of the image among those of the label.
         image: u8,
@@ -150,7 +150,7 @@ messages! {
         taken: Time,
         /// How wide it is on the sea floor, metres; NaN where it is not known.
         width_m: f64,
-        /// Its middle in the world frame.
+        /// Its middle in the frame of the header, or in the world frame where that is empty.
         middle: Point,
         /// Whether somebody asked for it.
         requested: bool,

@@ -40,6 +40,9 @@ pub fn seconds(at: Instant) -> f64 {
 pub struct MissionState {
     /// The mission time of this state.
     pub now_s: f64,
+    /// The time of day at that moment by the surface's clock, seconds since 1970; null before it is known.
+    #[serde(default)]
+    pub utc_s: Option<f64>,
     /// Name, origin and end of the mission.
     pub mission: MissionInfo,
     /// The vehicles that the surface exchanges frames with, by address.

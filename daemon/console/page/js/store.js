@@ -63,6 +63,13 @@ export const store = new (class extends EventTarget {
     return now_s + ((performance.now() - this.receivedMs) / 1000) * mission.speed;
   }
 
+  /** The time of day at the surface, seconds since 1970, or null before it is known. */
+  get utcS() {
+    const { utc_s, mission } = this.snapshot ?? {};
+    if (!utc_s) return null;
+    return mission.ended || this.replay ? utc_s : utc_s + (performance.now() - this.receivedMs) / 1000;
+  }
+
   get connected() {
     return this.feed.state === "open";
   }

@@ -125,7 +125,7 @@ impl Replay {
         let mut state = self.recorded_state();
         let mission_speed = state.mission.speed.max(1e-3);
         state.mission.speed = if self.is_playing { mission_speed * self.speed } else { 0.0 };
-        state.now_s = mission_s;
+        (state.now_s, state.utc_s) = (mission_s, Some(self.at as f64 / 1e9));
         // The picture of the true classes is in no record.
         state.truth = None;
         state.log = self.logged() as u64;

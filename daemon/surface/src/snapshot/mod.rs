@@ -44,10 +44,18 @@ impl Snapshot {
     }
 }
 
+/// The time of day at a mission time.
+fn utc_s(facts: &MissionFacts, now: Instant) -> Option<f64> {
+    // Without a moment at which both were known, mission times count from 1970.
+    const KNOWN_S: f64 = 1e9;
+    Some(facts.stamps.at(now.as_secs_f64()).nanos() as f64 / 1e9).filter(|utc_s| *utc_s > KNOWN_S)
+}
+
 /// The state of the surface.
 pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now: Instant) -> Snapshot {
     let state = MissionState {
         now_s: seconds(now),
+        utc_s: utc_s(facts, now),
         mission: MissionInfo {
             name: facts.name.clone(),
             id: facts.run.clone(),

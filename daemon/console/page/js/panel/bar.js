@@ -1,7 +1,7 @@
 // The bar at the top: mission, choice of vehicle, mission time, state of the feed.
 
 import { $, h, keyed, show, text } from "../dom.js";
-import { missionTime, span } from "../format.js";
+import { missionTime, span, utc } from "../format.js";
 import { ageOf, isSilent, store } from "../store.js";
 
 /** The speed of a rehearsal that has just begun is not measured yet. */
@@ -19,6 +19,7 @@ function update() {
   const { mission, vehicles } = store.snapshot;
   text($("mission"), mission.speed === 1 || mission.speed < LEAST_SPEED || store.replay ? mission.name : `${mission.name} ×${Number(mission.speed.toPrecision(2))}`);
   text($("clock"), missionTime(store.nowS));
+  text($("utc"), store.utcS === null ? "" : utc(store.utcS).slice(11));
   keyed($("vehicles"), vehicles, (v) => v.id, make, refresh);
   // Command and alarms are of the present.
   for (const id of ["command", "sound"]) show($(id), !store.replay);
