@@ -73,7 +73,7 @@ impl Tile {
         self.near.iter().filter(|near| **near > 0).count()
     }
 
-    /// The picture without holes.
+    /// The picture, with the mean colour of its seen pixels in its holes.
     fn filled(&self) -> RgbImage {
         let mut sum = [0_u64; 3];
         let seen = self.seen().max(1) as u64;
