@@ -63,7 +63,7 @@ impl MapAge {
 /// Energy that the vehicle's modem has transmitted with, joules; `None` where its power is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UplinkEnergy {
-    /// In all.
+    /// Joules of all transmissions of the vehicle.
     pub energy_j: Option<f64>,
     /// For each bit of the map that arrived.
     pub energy_per_map_bit_j: Option<f64>,

@@ -47,12 +47,12 @@ impl FloorViews {
         self.version
     }
 
-    /// The number of views.
+    /// The number of views that are held.
     pub fn count(&self) -> usize {
         self.views.len()
     }
 
-    /// Bytes of all images.
+    /// Bytes of all images as they are stored.
     pub fn bytes(&self) -> usize {
         self.bytes
     }

@@ -92,7 +92,7 @@ impl Tile {
         Some(FloorTile { at, picture, seen: seen as u32, middle_m, width_m, t_s: self.seen_s })
     }
 
-    /// The picture without holes.
+    /// The picture, with the mean colour of its seen pixels in its holes.
     fn filled(&self) -> RgbImage {
         let mut sum = [0_u64; 3];
         let seen = self.seen().max(1) as u64;

@@ -144,9 +144,9 @@ impl LinkStats {
 /// The recent quality of one direction of a link.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LinkQuality {
-    /// Lost frames.
+    /// The share of lost frames among the last ones.
     pub loss: Loss,
-    /// Useful bits that arrived.
+    /// The rate of useful bits that arrived, bit/s.
     pub goodput: Goodput,
 }
 

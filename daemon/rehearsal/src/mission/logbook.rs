@@ -59,7 +59,7 @@ pub(crate) struct Logbook {
 pub(crate) struct GivenMap {
     cells: LabelGrid,
     epoch: u8,
-    /// The highest label.
+    /// The highest label that the producers have assigned.
     pub(crate) highest: u8,
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,

@@ -255,7 +255,7 @@ fn extend(track: &mut VecDeque<(u64, f64, f64)>, points: &[(u64, f64, f64)]) {
 pub(crate) struct ImageMemory {
     /// By label, in the order of arrival.
     pub(crate) exemplars: BTreeMap<u8, Vec<StoredImage>>,
-    /// By their middle.
+    /// Views of the sea floor by their middle.
     pub(crate) floor: BTreeMap<(i32, i32), StoredImage>,
     /// Serial number of requests and the open one, by label.
     pub(crate) requests: BTreeMap<u8, (u8, Option<StoredRequest>)>,

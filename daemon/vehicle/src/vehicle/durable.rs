@@ -54,7 +54,7 @@ impl Durable {
 
 // The fields of these parts follow each other in the stored bytes as if they stood in `Durable` itself.
 
-/// The utility in force.
+/// The utility that the vehicle plans by.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct KeptUtility {
     /// Epoch, exploration, curiosity, weights; in hundredths.
@@ -78,9 +78,9 @@ impl KeptUtility {
 /// The budget of the link in force, where it differs from the configuration.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct KeptBudget {
-    /// Bits a second.
+    /// Bits on air a second, over the budget's window.
     pub bits_per_s: Option<u32>,
-    /// Least shares in percent.
+    /// Least shares of the classes in percent.
     pub shares: Option<[u8; 5]>,
     /// Order of the background streams as on the wire.
     pub background: Option<Vec<u8>>,
