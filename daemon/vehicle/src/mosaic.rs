@@ -21,7 +21,7 @@ const SETTLED_S: f64 = 10.0;
 const LEAST_SEEN: f64 = 0.3;
 const LEAST_NEW: f64 = 0.1;
 /// A frame is added if it lies so far from the last one, in parts of what it reaches from its middle.
-const LEAST_STEP: f64 = 0.15;
+const LEAST_STEP: f64 = 0.3;
 /// How much nearer to the middle of its frame a pixel has to be than the one that it replaces, of 255.
 const NEARER: u8 = 12;
 
