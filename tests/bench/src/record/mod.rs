@@ -171,7 +171,8 @@ fn cut(
         let cut = begin + ((moment.at_s - begin_s).max(0.0) * 1e9) as u64;
         // While nothing happens, nothing is lost.
         let last = written.into_iter().filter(|nanos| *nanos <= cut).max().unwrap_or(begin);
-        let mut kept = 0;
+        // A cut in the first seconds may leave no message: what is lost is then all since the begin.
+        let mut kept = begin;
         if let Some(damage) = read_record(&folder, |message| kept = kept.max(message.nanos()))? {
             return Err(UserError::file(&folder, format!("after recover: {damage}")));
         }
