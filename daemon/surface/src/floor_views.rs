@@ -96,6 +96,13 @@ impl FloorViews {
     }
 }
 
+impl FloorImage {
+    /// The path on this server of the image with this middle and number of arrival.
+    pub fn url(vehicle: u8, (east_dm, north_dm): FloorPlace, number: u64) -> String {
+        format!("/api/v2/vehicles/{vehicle}/floor/{east_dm}_{north_dm}.webp?number={number}")
+    }
+}
+
 /// The views of a vehicle that have arrived after a version.
 pub fn floor_list(vehicle: u8, views: &FloorViews, since: u64) -> FloorList {
     let image =
@@ -105,10 +112,10 @@ pub fn floor_list(vehicle: u8, views: &FloorViews, since: u64) -> FloorList {
     FloorList { version: views.version(), images: images.into_iter().map(|(_, image)| image).collect() }
 }
 
-fn floor_image(vehicle: u8, (east_dm, north_dm): FloorPlace, number: u64, view: &StoredExemplar) -> FloorImage {
+fn floor_image(vehicle: u8, place: FloorPlace, number: u64, view: &StoredExemplar) -> FloorImage {
     let (x_m, y_m) = view.view.middle_m();
     FloorImage {
-        url: format!("/api/v2/vehicles/{vehicle}/floor/{east_dm}_{north_dm}.webp?number={number}"),
+        url: FloorImage::url(vehicle, place, number),
         x_m,
         y_m,
         width_m: view.width_m().unwrap_or_default(),
@@ -144,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn views_of_an_earlier_map_are_gone_and_a_new_run_of_the_link_keeps_all() {
+    fn views_of_an_earlier_map_are_gone_and_others_stay() {
         let mut views = FloorViews::default();
         views.handle(&view(10, 0, 40), None, Instant::ZERO);
         views.follow(1);

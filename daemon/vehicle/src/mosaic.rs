@@ -18,10 +18,10 @@ const MAX_IN_VIEW: f64 = 100.0;
 /// A tile is given out once it was out of view for this time, seconds; sooner, the next frame would change it.
 const SETTLED_S: f64 = 10.0;
 /// The part of a tile that has to be seen, and that has to be new since it was given out last.
-const LEAST_SEEN: f64 = 0.3;
-const LEAST_NEW: f64 = 0.1;
+const MIN_SEEN: f64 = 0.3;
+const MIN_NEW: f64 = 0.1;
 /// A frame is added if it lies so far from the last one, in parts of what it reaches from its middle.
-const LEAST_STEP: f64 = 0.3;
+const MIN_STEP: f64 = 0.3;
 /// How much nearer to the middle of its frame a pixel has to be than the one that it replaces, of 255.
 const NEARER: u8 = 12;
 
@@ -51,7 +51,7 @@ pub struct FloorTile {
 
 /// A tile in the making.
 #[derive(Debug, Clone)]
-struct Tile {
+struct OpenTile {
     picture: RgbImage,
     /// How near to the middle of its frame each pixel was, 1 to 255; 0 where no frame has shown it.
     near: Vec<u8>,
@@ -61,7 +61,7 @@ struct Tile {
     is_changed: bool,
 }
 
-impl Tile {
+impl OpenTile {
     fn new(t_s: f64) -> Self {
         let pixels = TILE_PX as usize * TILE_PX as usize;
         Self {
@@ -83,19 +83,18 @@ impl Tile {
             return None;
         }
         let (seen, all) = (self.seen(), f64::from(TILE_PX * TILE_PX));
-        if (seen as f64) < LEAST_SEEN * all || (seen.saturating_sub(self.given) as f64) < LEAST_NEW * all {
+        if (seen as f64) < MIN_SEEN * all || (seen.saturating_sub(self.given) as f64) < MIN_NEW * all {
             return None;
         }
         self.given = seen;
         let middle = |index: i32| (f64::from(index) + 0.5) * width_m;
-        let (middle_m, picture) = ((middle(at.0), middle(at.1)), self.filled().into());
+        let (middle_m, picture) = ((middle(at.0), middle(at.1)), self.filled(seen).into());
         Some(FloorTile { at, picture, seen: seen as u32, middle_m, width_m, t_s: self.seen_s })
     }
 
-    /// The picture, with the mean colour of its seen pixels in its holes.
-    fn filled(&self) -> RgbImage {
-        let mut sum = [0_u64; 3];
-        let seen = self.seen().max(1) as u64;
+    /// The picture, with the mean colour of its `seen` pixels in its holes.
+    fn filled(&self, seen: usize) -> RgbImage {
+        let (mut sum, seen) = ([0_u64; 3], seen.max(1) as u64);
         for (pixel, _) in self.picture.pixels().zip(&self.near).filter(|(_, near)| **near > 0) {
             (0..3).for_each(|c| sum[c] += u64::from(pixel.0[c]));
         }
@@ -156,7 +155,7 @@ impl Lie {
 /// The picture of the sea floor so far.
 #[derive(Debug, Clone, Default)]
 pub struct Mosaic {
-    tiles: BTreeMap<TilePlace, Tile>,
+    tiles: BTreeMap<TilePlace, OpenTile>,
     /// Place of the last frame that was added, metres, and its mission time, seconds.
     last: Option<((f64, f64), f64)>,
 }
@@ -171,7 +170,7 @@ impl Mosaic {
             return;
         }
         // What a frame shows better than one from about the same place is not worth the time.
-        let is_near = |(x, y): (f64, f64)| (x - lie.place.0).hypot(y - lie.place.1) < LEAST_STEP * east_m.min(north_m);
+        let is_near = |(x, y): (f64, f64)| (x - lie.place.0).hypot(y - lie.place.1) < MIN_STEP * east_m.min(north_m);
         if self.last.is_some_and(|(place, last_s)| is_near(place) && (t_s - last_s).abs() < SETTLED_S / 2.0) {
             return;
         }
@@ -224,7 +223,7 @@ impl Mosaic {
             return;
         }
         let box_px = ((lie.pixels(pitch, 0.0).0.hypot(lie.pixels(pitch, 0.0).1)).round() as i64).clamp(1, 8);
-        let tile = self.tiles.entry(at).or_insert_with(|| Tile::new(t_s));
+        let tile = self.tiles.entry(at).or_insert_with(|| OpenTile::new(t_s));
         // A second step of Newton's method: a pixel is moved by what the camera puts it beside its place. Places come in the order of
         // the pixels, without those that see no floor.
         let mut seen = project(&words).into_iter().peekable();

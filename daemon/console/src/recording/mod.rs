@@ -16,6 +16,7 @@ use scenecast_messages::geometry_msgs::PoseWithCovarianceStamped;
 use scenecast_messages::scenecast_msgs::{Event, Exemplar, Frame, Link, Order, OrderStatus};
 use scenecast_messages::std_msgs::Text;
 use scenecast_protocol::time::Instant;
+use scenecast_surface::FloorPlace;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -374,6 +375,14 @@ impl Record {
 }
 
 impl Known {
+    /// The views of the sea floor on its map that had come in by a moment, the latest of each place, with the times at which they did.
+    pub(crate) fn floor_until(&self, nanos: u64) -> BTreeMap<FloorPlace, (u64, &Exemplar)> {
+        let epoch = u32::from(self.map.shown().epoch);
+        let so_far = self.floor.iter().take_while(|(at, _)| *at <= nanos).filter(|(_, view)| view.epoch == epoch);
+        let dm = |m: f64| (m * 10.0).round() as i32;
+        so_far.map(|(at, view)| ((dm(view.middle.x), dm(view.middle.y)), (*at, view))).collect()
+    }
+
     /// Adds what a later record knew, by a clock that is to be shifted by `shift` nanoseconds.
     fn add(&mut self, later: Self, shift: i64) {
         let moved = |nanos: u64| nanos.saturating_add_signed(shift);

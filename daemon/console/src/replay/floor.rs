@@ -6,17 +6,14 @@ use scenecast_surface::FloorPlace;
 use scenecast_surface::state::{FloorImage, FloorList, FloorSummary};
 use std::collections::BTreeMap;
 
-/// The images that had arrived on the map of that moment, the latest of each place, with the numbers of their arrival.
-type Held<'a> = BTreeMap<FloorPlace, (u64, &'a Exemplar)>;
-
 impl Replay {
-    fn floor_held(&self, part: &str) -> Held<'_> {
-        let Some(known) = self.recording.operator.get(part) else { return Held::new() };
-        let epoch = u32::from(known.map.shown().epoch);
+    /// The images that had arrived on the map of that moment, the latest of each place, with the numbers of their arrival.
+    fn floor_held(&self, part: &str) -> BTreeMap<FloorPlace, (u64, &Exemplar)> {
         let begin = self.recording.timeline.span.0;
-        let so_far = known.floor.iter().take_while(|(at, _)| *at <= self.at).filter(|(_, view)| view.epoch == epoch);
         // Microseconds are whole numbers for every reader.
-        so_far.map(|(at, view)| (place_of(view), (1 + at.saturating_sub(begin) / 1000, view))).collect()
+        let numbered = |(place, (at, view)): (_, (u64, _))| (place, (1 + at.saturating_sub(begin) / 1000, view));
+        let known = self.recording.operator.get(part).into_iter();
+        known.flat_map(|known| known.floor_until(self.at)).map(numbered).collect()
     }
 
     /// The latest image with this middle.
@@ -38,8 +35,8 @@ impl Replay {
     /// The images of a vehicle with a number above `since`.
     pub(super) fn floor(&self, id: u8, part: &str, since: u64) -> FloorList {
         let mission_s = |nanos: i64| self.recording.timeline.mission_s(nanos.max(0) as u64);
-        let image = |((east_dm, north_dm), number, view): (FloorPlace, u64, &Exemplar)| FloorImage {
-            url: format!("/api/v2/vehicles/{id}/floor/{east_dm}_{north_dm}.webp?number={number}"),
+        let image = |(place, number, view): (FloorPlace, u64, &Exemplar)| FloorImage {
+            url: FloorImage::url(id, place, number),
             x_m: view.middle.x,
             y_m: view.middle.y,
             width_m: view.width_m,
@@ -52,9 +49,4 @@ impl Replay {
         let version = news.last().map_or(since, |(_, number, _)| *number);
         FloorList { version, images: news.into_iter().map(image).collect() }
     }
-}
-
-fn place_of(view: &Exemplar) -> FloorPlace {
-    let dm = |m: f64| (m * 10.0).round() as i32;
-    (dm(view.middle.x), dm(view.middle.y))
 }

@@ -123,6 +123,16 @@ pub(super) struct OwnRecord {
     pub(super) settings: SettingsRecord,
 }
 
+/// The names of a vehicle's modes, without their reasons, each since a time in seconds since 1970.
+pub(super) struct ModeChanges<'a>(Vec<(f64, &'a str)>);
+
+impl ModeChanges<'_> {
+    /// The mode at a moment; `None` before the first that is known.
+    pub(super) fn at(&self, at_s: f64) -> Option<&str> {
+        self.0.iter().rev().find(|(since_s, _)| *since_s <= at_s).map(|(_, mode)| *mode)
+    }
+}
+
 impl OwnRecord {
     /// The times between its runs.
     pub(super) fn pauses(&self) -> impl Iterator<Item = (f64, f64)> {
@@ -132,10 +142,20 @@ impl OwnRecord {
 
 impl Dive {
     /// The events about the modes of a vehicle.
-    pub(super) fn modes(&self, state: &VehicleState, vehicle: &DiveVehicle) -> impl Iterator<Item = (f64, &Event)> {
+    pub(super) fn modes<'a>(
+        &'a self,
+        state: &VehicleState,
+        vehicle: &DiveVehicle,
+    ) -> impl Iterator<Item = (f64, &'a Event)> + use<'a> {
         let (of_modes, part) = (vehicle.mode_source(), valid_part(&state.name));
         let is_mode = move |event: &Event| event.source == of_modes && valid_part(&event.vehicle) == part;
         self.events.iter().filter(move |(_, event)| is_mode(event)).map(|(at_s, event)| (*at_s, event))
+    }
+
+    /// The modes of a vehicle over time.
+    pub(super) fn mode_changes<'a>(&'a self, state: &VehicleState, vehicle: &DiveVehicle) -> ModeChanges<'a> {
+        let mode = |text: &'a str| text.split(": ").next().unwrap_or_default();
+        ModeChanges(self.modes(state, vehicle).map(|(at_s, event)| (at_s, mode(&event.text))).collect())
     }
 
     /// What the vehicle ran with, by its own record, or else the surface.

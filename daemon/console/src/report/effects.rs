@@ -65,10 +65,9 @@ impl Aim {
     }
 }
 
-/// Whether a place lies in an area.
-fn is_in(point: &TrackPoint, area: &Polygon) -> bool {
-    let at = DecimetrePoint::nearest(WorldPoint { east_m: point.east_m, north_m: point.north_m });
-    at.is_some_and(|at| area.contains(at))
+/// A place as fences and areas are tested with it; `None` if it is beyond their range.
+fn decimetres(point: &TrackPoint) -> Option<DecimetrePoint> {
+    DecimetrePoint::nearest(WorldPoint { east_m: point.east_m, north_m: point.north_m })
 }
 
 /// The time that a vehicle was under way in a span, and how much of it at some places; seconds of the clock.
@@ -248,12 +247,9 @@ impl Way<'_> {
 
     /// The share of the time in which the vehicle surveyed that it was at each goal, before the order and then.
     fn surveyed(&self, goals: &[Option<Goal<'_>>]) -> String {
-        let modes: Vec<(f64, bool)> = (self.dive.modes(self.state, self.vehicle))
-            .map(|(at_s, event)| (at_s, event.text.split(": ").next() == Some(VehicleMode::Survey.name())))
-            .collect();
+        let modes = self.dive.mode_changes(self.state, self.vehicle);
         // A surface alone does not know the first mode.
-        let surveys =
-            |at_s: f64| modes.iter().rev().find(|(since_s, _)| *since_s <= at_s).is_none_or(|(_, surveys)| *surveys);
+        let surveys = |at_s: f64| modes.at(at_s).is_none_or(|mode| mode == VehicleMode::Survey.name());
         let told = goals.iter().flatten().map(|goal| {
             let [stay, before] = [self.span_s, (f64::NEG_INFINITY, self.span_s.0)]
                 .map(|span_s| self.vehicle.stay(span_s, surveys, &goal.has));
@@ -291,36 +287,24 @@ impl Way<'_> {
         let away = |point: &TrackPoint| (point.east_m - east_m).hypot(point.north_m - north_m);
         let nearest_m = self.places().map(away).reduce(f64::min)?;
         let arrived_s = self.vehicle.stay(self.span_s, |_| true, |point| away(point) <= ARRIVED_M).first_s;
-        Some(match arrived_s {
-            Some(at_s) => (
-                format!(
-                    "it arrived (to {ARRIVED_M} m) {} after the order was applied, which ended it",
-                    self.since(at_s)
-                ),
+        if let Some(at_s) = arrived_s {
+            let after = self.since(at_s);
+            return Some((
+                format!("it arrived (to {ARRIVED_M} m) {after} after the order was applied, which ended it"),
                 at_s,
-            ),
-            None => match self.vehicle.destination_ended_s(self.span_s) {
-                Some(at_s) => {
-                    let nearest = format!("its nearest known place is {nearest_m:.1} m away");
-                    (
-                        format!("by {} it had ended the order, as it does where it arrives; {nearest}", utc_text(at_s)),
-                        at_s,
-                    )
-                }
-                None => (
-                    format!("it did not arrive, as far as its places tell; the nearest is {nearest_m:.1} m away"),
-                    self.span_s.1,
-                ),
-            },
-        })
+            ));
+        }
+        if let Some(at_s) = self.vehicle.destination_ended_s(self.span_s) {
+            let (by, nearest) = (utc_text(at_s), format!("its nearest known place is {nearest_m:.1} m away"));
+            return Some((format!("by {by} it had ended the order, as it does where it arrives; {nearest}"), at_s));
+        }
+        let told = format!("it did not arrive, as far as its places tell; the nearest is {nearest_m:.1} m away");
+        Some((told, self.span_s.1))
     }
 
     fn fenced(&self, fence: &Fence) -> Option<String> {
-        let allows = |point: &TrackPoint| {
-            fence.fence.as_ref().is_none_or(|fence| is_in(point, fence))
-                && !fence.keep_outs.iter().any(|area| is_in(point, area))
-        };
-        let stay = self.vehicle.stay(self.span_s, |_| true, allows);
+        let stay =
+            self.vehicle.stay(self.span_s, |_| true, |point| decimetres(point).is_some_and(|at| fence.allows(at)));
         let out_s = stay.all_s - stay.there_s;
         (stay.all_s > 0.0).then(|| match out_s < 0.05 {
             true => "where it allows, all the time".to_owned(),
@@ -339,7 +323,9 @@ impl Way<'_> {
 fn areas(areas: &[Polygon], is_favoured: bool) -> Option<Goal<'_>> {
     let weight = if is_favoured { "positive" } else { "negative" };
     let place = format!("in the {} of {weight} weight", if areas.len() == 1 { "area" } else { "areas" });
-    let has = Box::new(move |point: &TrackPoint| areas.iter().any(|area| is_in(point, area)));
+    let has = Box::new(move |point: &TrackPoint| {
+        decimetres(point).is_some_and(|at| areas.iter().any(|area| area.contains(at)))
+    });
     (!areas.is_empty()).then_some(Goal { place, is_favoured, of_map: None, has })
 }
 
@@ -403,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fence_is_told_by_the_time_outside_of_it_and_a_hold_by_its_place() {
+    fn a_fence_is_told_by_the_time_outside_and_a_hold_by_its_place() {
         let fence = |east_m: u32| format!(r#"{{"fence": [[-1, -1], [{east_m}, -1], [{east_m}, 2], [-1, 2]]}}"#);
         assert!(told(&[("fence", 0, &fence(30))]).contains("where it allows, all the time"));
         let page = told(&[("fence", 0, &fence(16))]);

@@ -144,10 +144,7 @@ impl DiveVehicle {
             maps,
             ..Self::default()
         };
-        let floor = known.floor.iter().filter(|(_, view)| view.epoch == u32::from(shown.epoch));
-        let middle = |view: &Exemplar| ((view.middle.x * 10.0).round() as i32, (view.middle.y * 10.0).round() as i32);
-        let latest: BTreeMap<_, _> = floor.map(|(_, view)| (middle(view), view)).collect();
-        vehicle.floor = latest.into_values().cloned().collect();
+        vehicle.floor = known.floor_until(u64::MAX).into_values().map(|(_, view)| view.clone()).collect();
         // Of an earlier epoch, their numbers mean something else.
         let is_current = |exemplar: &Exemplar| exemplar.epoch == u32::from(shown.epoch);
         let exemplars = known.exemplars.iter().filter(|(_, exemplar)| is_current(exemplar));

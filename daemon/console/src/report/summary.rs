@@ -6,7 +6,7 @@ use super::order_step::OrderStep;
 use super::words::{self, area, counted, interval};
 use super::{extent, gaps, trouble, way};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
+use scenecast_messages::scenecast_msgs::OrderStatus;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
@@ -47,16 +47,13 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
 
 /// The moments of the comparison at which the vehicle surveyed, or all of them where its modes are not known.
 fn surveyed(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<MapsAt> {
-    let modes: Vec<(f64, &Event)> = dive.modes(state, vehicle).collect();
+    let modes = dive.mode_changes(state, vehicle);
     // After its record it may have been ended.
     let is_recorded = |at_s: f64| {
         let mut runs = vehicle.own.runs_s.iter();
         runs.len() == 0 || runs.any(|(from_s, to_s)| (*from_s..=*to_s).contains(&at_s))
     };
-    let did_survey = |maps: &&MapsAt| {
-        let last = modes.iter().rev().find(|(at_s, _)| *at_s <= maps.at_s);
-        is_recorded(maps.at_s) && last.is_some_and(|(_, event)| event.text.starts_with(VehicleMode::Survey.name()))
-    };
+    let did_survey = |maps: &&MapsAt| is_recorded(maps.at_s) && modes.at(maps.at_s) == Some(VehicleMode::Survey.name());
     let surveyed: Vec<MapsAt> = vehicle.maps.iter().filter(did_survey).copied().collect();
     if surveyed.is_empty() { vehicle.maps.clone() } else { surveyed }
 }

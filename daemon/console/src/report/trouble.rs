@@ -19,7 +19,6 @@ const MAX_TOLD: usize = 12;
 /// The events that people should look at: faults, silences, restarts, and modes that nobody had ordered.
 pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let modes = vehicle.mode_source();
-    let is_of_it = |event: &Event| event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name);
     let is_restart = |event: &Event| event.source == "contact" && event.text == words::ANOTHER_RUN;
     let is_of_silence = |event: &Event| ["received", "silent for "].iter().any(|begin| event.text.starts_with(begin));
     let has_own = !vehicle.own.runs_s.is_empty();
@@ -31,7 +30,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         "contact" => !(is_of_silence(event) || has_own && is_restart(event)),
         _ => false,
     };
-    let of_it = || dive.events.iter().filter(|(_, event)| is_of_it(event));
+    let of_it = || dive.events.iter().filter(|(_, event)| is_of(event, state));
     let told = |(at_s, event): &(f64, Event)| (*at_s, words::event(&state.label_book, event));
     let restart = |who: &str, (from_s, to_s): (f64, f64), map: String| {
         let (again, lasted) = (utc_text(to_s), dive.lasted(to_s - from_s));
@@ -63,11 +62,15 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     }
 }
 
+/// Whether an event is about a vehicle, or about all.
+fn is_of(event: &Event, state: &VehicleState) -> bool {
+    event.vehicle.is_empty() || valid_part(&event.vehicle) == valid_part(&state.name)
+}
+
 impl Dive {
     /// The requests of people that the surface refused and did not send.
     pub(super) fn not_sent(&self, state: &VehicleState) -> impl Iterator<Item = &(f64, Event)> {
-        let is_of_it = |event: &Event| event.vehicle == state.name || event.vehicle.is_empty();
-        self.events.iter().filter(move |(_, event)| event.source == LogKind::Refused.name() && is_of_it(event))
+        self.events.iter().filter(|(_, event)| event.source == LogKind::Refused.name() && is_of(event, state))
     }
 }
 

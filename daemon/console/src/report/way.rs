@@ -128,11 +128,9 @@ fn moved(state: &VehicleState, vehicle: &DiveVehicle) -> String {
 
 /// The depths of its path while it rose to the surface, and those of the rest, metres.
 fn depths(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> (Vec<f64>, Vec<f64>) {
-    let rises = |text: &str| {
-        [VehicleMode::Surface, VehicleMode::Abort].iter().any(|mode| text.split(": ").next() == Some(mode.name()))
-    };
-    let modes: Vec<(f64, bool)> = dive.modes(state, vehicle).map(|(at_s, event)| (at_s, rises(&event.text))).collect();
-    let is_rising = |at_s: f64| modes.iter().rev().find(|(from_s, _)| *from_s <= at_s).is_some_and(|(_, rises)| *rises);
+    let rises = [VehicleMode::Surface, VehicleMode::Abort].map(VehicleMode::name);
+    let modes = dive.mode_changes(state, vehicle);
+    let is_rising = |at_s: f64| modes.at(at_s).is_some_and(|mode| rises.contains(&mode));
     let (rising, deep): (Vec<&TrackPoint>, Vec<&TrackPoint>) =
         vehicle.path().iter().partition(|point| is_rising(point.at_s));
     let depths = |points: Vec<&TrackPoint>| points.into_iter().map(|point| point.depth_m).collect();

@@ -35,7 +35,7 @@ enum Picture {
 }
 
 #[derive(Debug)]
-struct Tile {
+struct SentTile {
     /// Counts the tiles, so that the oldest are known.
     serial: u64,
     picture: Picture,
@@ -61,7 +61,7 @@ struct InFlight {
 /// The tiles, and how much of each was sent.
 #[derive(Debug, Default)]
 pub(super) struct FloorPictures {
-    tiles: BTreeMap<TilePlace, Tile>,
+    tiles: BTreeMap<TilePlace, SentTile>,
     in_flight: Vec<InFlight>,
     serial: u64,
     /// The series of the surface that has what was sent.
@@ -82,9 +82,9 @@ impl FloorPictures {
             self.serial += 1;
             let FloorTile { at, middle_m, width_m, t_s, seen, .. } = *tile;
             let picture = Picture::Pixels(tile.picture.clone());
-            self.tiles.insert(at, Tile { serial: self.serial, picture, middle_m, width_m, t_s, seen, next });
+            self.tiles.insert(at, SentTile { serial: self.serial, picture, middle_m, width_m, t_s, seen, next });
         }
-        let has_pixels = |tile: &Tile| matches!(tile.picture, Picture::Pixels(_));
+        let has_pixels = |tile: &SentTile| matches!(tile.picture, Picture::Pixels(_));
         while self.tiles.values().filter(|tile| has_pixels(tile)).count() > MAX_PICTURES {
             self.drop_oldest(has_pixels);
         }
@@ -93,7 +93,7 @@ impl FloorPictures {
         }
     }
 
-    fn drop_oldest(&mut self, is_one: impl Fn(&Tile) -> bool) {
+    fn drop_oldest(&mut self, is_one: impl Fn(&SentTile) -> bool) {
         let of_kind = self.tiles.iter().filter(|(_, tile)| is_one(tile));
         let oldest = of_kind.min_by_key(|(_, tile)| tile.serial).map(|(at, _)| *at);
         oldest.map(|at| self.tiles.remove(&at));
@@ -179,7 +179,7 @@ impl FloorPictures {
     }
 }
 
-impl Tile {
+impl SentTile {
     /// The picture in a size class; `None` if it cannot be compressed. Once it was compressed whole, its pixels are not kept.
     fn view(&mut self, epoch: u8, size: u8, frames: &FrameClock, now: Instant) -> Option<FloorView> {
         let (size, bytes) = match &self.picture {
@@ -213,17 +213,9 @@ fn coded(picture: &RgbImage, size: u8) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link_config;
+    use crate::vehicle::default_link as link;
     use image::Rgb;
-    use scenecast_config::{Config, modem_profile};
     use scenecast_protocol::schedule::BackgroundOrder;
-
-    fn link() -> VehicleLink {
-        let config = Config::default();
-        let profile = modem_profile(&config, config.modem.bit_rate);
-        let link = link_config(&config, None, profile).unwrap();
-        VehicleLink::new(link, config.map.codec, 1, Default::default(), Instant::ZERO)
-    }
 
     fn tile(column: i32) -> FloorTile {
         let picture = RgbImage::from_fn(128, 128, |x, y| Rgb([(x * 2) as u8, (y * 2) as u8, column as u8]));
@@ -258,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_surface_has_whole_is_not_replaced_by_a_small_or_lesser_picture() {
+    fn what_is_there_whole_does_not_become_small_or_less() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
         floor.add(&[FloorTile { seen: 9000, ..tile(1) }], &mut link);
         assert_eq!(sent(&mut floor, &mut link), [(1, 0), (1, 1)]);
@@ -269,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_in_flight_is_sent_again_after_a_restart_of_the_link_and_all_on_another_map() {
+    fn a_new_run_resends_what_was_in_flight_and_another_map_all() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
         floor.add(&[tile(1), tile(2)], &mut link);
         floor.serve(0, |_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);
@@ -284,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_is_in_flight_than_the_link_takes_and_nothing_unless_it_is_listed() {
+    fn little_is_in_flight_and_nothing_that_is_not_listed() {
         let (mut floor, mut link) = (FloorPictures::default(), link());
         floor.add(&(0..40).map(tile).collect::<Vec<_>>(), &mut link);
         floor.serve(0, |_, _| 0.0, &FrameClock::default(), &mut link, Instant::ZERO);

@@ -312,16 +312,8 @@ fn head(epoch: u8, label: u8, serial: u8) -> Exemplar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link_config;
+    use crate::vehicle::default_link as link;
     use image::{Rgb, RgbImage};
-    use scenecast_config::{Config, modem_profile};
-
-    fn link() -> VehicleLink {
-        let config = Config::default();
-        let profile = modem_profile(&config, config.modem.bit_rate);
-        let link = link_config(&config, None, profile).unwrap();
-        VehicleLink::new(link, config.map.codec, 1, Default::default(), Instant::ZERO)
-    }
 
     fn patch(edge: u32, place: f64) -> ExemplarPatch {
         let image = RgbImage::from_fn(edge, edge, |x, y| Rgb([(x * 7 % 250) as u8, (y * 5 % 250) as u8, 90]));

@@ -445,6 +445,15 @@ impl Vehicle {
     }
 }
 
+/// The link of a vehicle that is configured by default.
+#[cfg(test)]
+fn default_link() -> VehicleLink {
+    let config = scenecast_config::Config::default();
+    let profile = scenecast_config::modem_profile(&config, config.modem.bit_rate);
+    let link = crate::link_config(&config, None, profile).unwrap();
+    VehicleLink::new(link, config.map.codec, 1, Default::default(), Instant::ZERO)
+}
+
 #[cfg(test)]
 mod band_tests;
 #[cfg(test)]
