@@ -8,7 +8,7 @@ pub use recorded::recorded;
 pub use relief::{RELIEF_CAMERA, is_on_block, relief_depth_m, write_relief};
 
 use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -92,22 +92,22 @@ pub fn scratch(name: &str) -> PathBuf {
     dir
 }
 
-/// A process that ends with the test.
-pub struct Process(Child);
+/// A process that ends with the test. If the test fails, the end of its log is printed.
+pub struct Process(Child, Option<PathBuf>);
 
 impl Process {
     pub fn start(arguments: &[&str]) -> Self {
         let child = scenecast().args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        Self(child.expect("scenecast starts"))
+        Self(child.expect("scenecast starts"), None)
     }
 
     /// Starts it with its log in a file, which has a line for each image that goes to the scene model.
     pub fn start_logged(arguments: &[&str], log: &Path) -> Self {
-        let log = std::fs::File::create(log).expect("the log can be written");
+        let file = std::fs::File::create(log).expect("the log can be written");
         let levels = "info,ros2_client=off,rustdds=error,zenoh=warn,scenecast_runtime::camera=debug";
         let mut process = scenecast();
-        let child = process.env("RUST_LOG", levels).args(arguments).stdout(Stdio::null()).stderr(log).spawn();
-        Self(child.expect("scenecast starts"))
+        let child = process.env("RUST_LOG", levels).args(arguments).stdout(Stdio::null()).stderr(file).spawn();
+        Self(child.expect("scenecast starts"), Some(log.to_owned()))
     }
 
     /// Kills it as a power cut would.
@@ -137,6 +137,13 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
+        const LINES: usize = 20;
+        if let Some(log) = self.1.as_ref().filter(|_| std::thread::panicking()) {
+            let text = std::fs::read_to_string(log).unwrap_or_default();
+            let lines: Vec<_> = text.lines().collect();
+            eprintln!("{} ends with:\n{}", log.display(), lines[lines.len().saturating_sub(LINES)..].join("\n"));
+            eprintln!("it {}", if matches!(self.0.try_wait(), Ok(None)) { "was running" } else { "had ended" });
+        }
         self.kill();
     }
 }
@@ -176,10 +183,22 @@ pub fn dds_domain() -> u8 {
     (1 + number % 99) as u8
 }
 
-/// A port of this machine that nobody listens on.
+/// A port of this machine that nobody listens on, and that no other test of this process gets. It is none of those that the
+/// system gives to clients, which may take one before its server starts.
+///
+/// # Panics
+///
+/// If all are taken.
 pub fn free_port() -> u16 {
-    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port is free");
-    listener.local_addr().expect("it has an address").port()
+    const PORTS: std::ops::Range<u32> = 20_000..32_000;
+    static TAKEN: AtomicU32 = AtomicU32::new(0);
+    let first = std::process::id() * 31;
+    let next = || PORTS.start + first.wrapping_add(TAKEN.fetch_add(1, Ordering::Relaxed)) % PORTS.len() as u32;
+    let is_free = |port: &u16| {
+        let address = ("127.0.0.1", *port);
+        TcpListener::bind(address).is_ok() && UdpSocket::bind(address).is_ok()
+    };
+    PORTS.filter_map(|_| u16::try_from(next()).ok()).find(is_free).expect("a port is free")
 }
 
 /// One HTTP request; status and body, `None` while nobody answers.

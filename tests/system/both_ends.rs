@@ -126,7 +126,15 @@ fn an_end_that_does_not_encrypt_is_named_at_both_ends() {
 /// The page names a mismatch, and so does the log of the vehicle.
 fn assert_both_name(page: u16, dir: &Path, at_surface: &str, at_vehicle: &str) {
     let said = || state(page)?["vehicles"][0]["link"]["mismatch"].as_str().map(str::to_owned);
-    wait_until(at_surface, || said().as_deref() == Some(at_surface));
+    let mut before = None;
+    wait_until(at_surface, || {
+        let now = said();
+        if now != before {
+            eprintln!("the page names {now:?}");
+        }
+        before.clone_from(&now);
+        now.as_deref() == Some(at_surface)
+    });
     let log = || std::fs::read_to_string(dir.join("auv.log")).unwrap_or_default();
     wait_until(at_vehicle, || log().contains(at_vehicle));
 }

@@ -117,8 +117,7 @@ impl MismatchReport {
     const MAX_FOUND: usize = 16;
 
     pub(super) fn note(&mut self, mismatch: Mismatch) {
-        let [_, tags, ..] = self.introduced;
-        if tags.is_some() && matches!(mismatch, Mismatch::Tag | Mismatch::NoTag) {
+        if self.is_explained(mismatch) {
             return;
         }
         self.tagged += u32::from(mismatch == Mismatch::Tag);
@@ -128,6 +127,16 @@ impl MismatchReport {
         }
         if is_certain && self.reported.insert(mismatch) {
             self.tell(mismatch);
+        }
+    }
+
+    /// Whether a setting that the peer has introduced is why its frames are refused.
+    fn is_explained(&self, mismatch: Mismatch) -> bool {
+        let [encryption, tags, ..] = self.introduced;
+        match mismatch {
+            Mismatch::Tag | Mismatch::NoTag => tags.is_some(),
+            Mismatch::Foreign => encryption.or(tags).is_some(),
+            _ => false,
         }
     }
 
@@ -255,7 +264,14 @@ impl MismatchReport {
 
     pub(super) fn current(&self) -> Option<Mismatch> {
         let [encryption, tags, duplex, origin] = self.introduced;
-        self.current.or(encryption).or(tags).or(duplex).or(self.length).or(origin).or(self.clock)
+        self.current
+            .filter(|found| !self.is_explained(*found))
+            .or(encryption)
+            .or(tags)
+            .or(duplex)
+            .or(self.length)
+            .or(origin)
+            .or(self.clock)
     }
 
     pub(super) fn poll(&mut self) -> Option<Mismatch> {

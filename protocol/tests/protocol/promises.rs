@@ -170,8 +170,14 @@ fn settings_that_differ_are_named_at_both_ends() {
         for (vehicle, surface) in [(&one, &other), (&other, &one)] {
             let mut pair = LinkedEnds::new(3, vehicle.clone(), STILL);
             pair.surface = surface_of(surface, 4, pair.now);
-            pair.run(pair.now + Duration::from_secs(30), false);
-            assert_eq!(pair.surface.vehicle(auv()).unwrap().mismatch(pair.now).map(kind), named);
+            for seconds in [30, 600] {
+                pair.run(pair.now + Duration::from_secs(seconds), false);
+                assert_eq!(
+                    pair.surface.vehicle(auv()).unwrap().mismatch(pair.now).map(kind),
+                    named,
+                    "after {seconds} s"
+                );
+            }
             let told = pair.vehicle_events.iter().find_map(|event| match event {
                 VehicleEvent::Mismatch(mismatch) => Some(kind(*mismatch)),
                 _ => None,
