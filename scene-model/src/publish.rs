@@ -156,6 +156,7 @@ impl LabelBook {
         in_step(shown, cells, |cell| (cell.y, cell.x)).filter_map(publish).collect()
     }
 
+    /// Gives numbers to the topics and habitats of these cells that have none: here a label is born.
     fn give_ids(&mut self, cells: &[FlatCell]) {
         let mut sizes: BTreeMap<TopicId, u32> = BTreeMap::new();
         for cell in cells {

@@ -159,7 +159,10 @@ async fn ask(place: &PortAddress, kind: ModemKind) -> io::Result<Option<Speaker>
     let Opened::Serial(mut stream) = open(place).await? else { return Ok(None) };
     let mut listener = PortListener::new(kind);
     listener.handle_open(Clock::new(1.0).now());
-    let question = if kind == ModemKind::S2c { S2C_QUESTION } else { MICROMODEM_QUESTION };
+    let question = match kind {
+        ModemKind::S2c => S2C_QUESTION,
+        ModemKind::Micromodem | ModemKind::Transparent | ModemKind::Tcp | ModemKind::Udp => MICROMODEM_QUESTION,
+    };
     listener.handle_written(question);
     stream.write_all(question).await?;
     let (end, mut buffer) = (Instant::now() + ANSWER_TIME, [0; 256]);

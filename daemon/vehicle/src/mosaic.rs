@@ -11,6 +11,10 @@ use std::sync::Arc;
 const TILE_CELLS: i32 = 8;
 /// Edge of a tile in pixels.
 pub const TILE_PX: u32 = 128;
+/// Edge of a block of a tile in pixels. Between its corners, the places of pixels are interpolated.
+const BLOCK_PX: u32 = 8;
+/// Corners of blocks along the edge of a tile.
+const CORNERS: u32 = TILE_PX / BLOCK_PX + 1;
 /// Tiles that are kept, 64 kB each; of more, those that were out of view for the longest time are dropped.
 const MAX_TILES: usize = 512;
 /// Tiles that a frame changes at most: one that seems to see more has no sound geometry.
@@ -71,6 +75,33 @@ impl OpenTile {
             given: 0,
             is_changed: false,
         }
+    }
+
+    /// Puts the pixels of a frame on the block of these first pixels whose corners lie there in the frame; whether one is better than
+    /// what was there.
+    fn add_block(&mut self, first: (u32, u32), corners: [(f64, f64); 4], frame: &RgbImage, box_px: u32) -> bool {
+        let part_of = [frame.width(), frame.height()].map(|edge| 2.0 / f64::from(edge));
+        let [a, b, c, d] = corners;
+        let between = |a: f64, b: f64, part: f64| a + (b - a) * part;
+        let part = |index: u32| (f64::from(index) + 0.5) / f64::from(BLOCK_PX);
+        let mut is_better = false;
+        for down in 0..BLOCK_PX {
+            let left = (between(a.0, c.0, part(down)), between(a.1, c.1, part(down)));
+            let end = (between(b.0, d.0, part(down)), between(b.1, d.1, part(down)));
+            for right in 0..BLOCK_PX {
+                let (u, v) = (between(left.0, end.0, part(right)), between(left.1, end.1, part(right)));
+                let off = (u * part_of[0] - 1.0).abs().max((v * part_of[1] - 1.0).abs());
+                let near = (255.0 * (1.0 - off)).max(1.0) as u8;
+                let (x, y) = (first.0 + right, first.1 + down);
+                let known = &mut self.near[(y * TILE_PX + x) as usize];
+                if off >= 1.0 || (*known > 0 && near <= known.saturating_add(NEARER)) {
+                    continue;
+                }
+                self.picture.put_pixel(x, y, mean_around(frame, (u, v), box_px));
+                (*known, is_better) = (near, true);
+            }
+        }
+        is_better
     }
 
     fn seen(&self) -> usize {
@@ -197,48 +228,24 @@ impl Mosaic {
         project: &impl Fn(&[Word]) -> Vec<Observation>,
         t_s: f64,
     ) {
-        let (width, height) = (f64::from(frame.width()), f64::from(frame.height()));
-        let pitch = edge_m / f64::from(TILE_PX);
-        let (west, north) = (f64::from(at.0) * edge_m, f64::from(at.1 + 1) * edge_m);
-        let place = |index: u32| {
-            let (column, row) = (index % TILE_PX, index / TILE_PX);
-            (west + (f64::from(column) + 0.5) * pitch, north - (f64::from(row) + 0.5) * pitch)
-        };
-        let nearness = |(u, v): (f64, f64)| {
-            let off = ((u / width - 0.5).abs()).max((v / height - 0.5).abs()) * 2.0;
-            (off < 1.0).then(|| (255.0 * (1.0 - off)).max(1.0) as u8)
-        };
-        let kept = self.tiles.get(&at);
-        let is_better = |index: u32, near: u8| {
-            let known = kept.map_or(0, |tile| tile.near[index as usize]);
-            known == 0 || near > known.saturating_add(NEARER)
-        };
-        let wanted = (0..TILE_PX * TILE_PX).filter_map(|id| {
-            let (u, v) = lie.pixel_of(place(id));
-            let near = nearness((u, v))?;
-            is_better(id, near).then_some((Word { id, u: u as f32, v: v as f32 }, near))
-        });
-        let (words, near): (Vec<Word>, Vec<u8>) = wanted.unzip();
-        if words.is_empty() {
-            return;
-        }
-        let box_px = ((lie.pixels(pitch, 0.0).0.hypot(lie.pixels(pitch, 0.0).1)).round() as i64).clamp(1, 8);
+        let corners = corners(at, edge_m, frame, lie, project);
+        let corner = |column: u32, row: u32| corners[(row * CORNERS + column) as usize];
+        let (pitch_right, pitch_down) = lie.pixels(edge_m / f64::from(TILE_PX), 0.0);
+        let box_px = (pitch_right.hypot(pitch_down).round() as u32).clamp(1, 8);
+        let blocks = (0..CORNERS - 1).flat_map(|row| (0..CORNERS - 1).map(move |column| (column, row)));
         let tile = self.tiles.entry(at).or_insert_with(|| OpenTile::new(t_s));
-        // A second step of Newton's method: a pixel is moved by what the camera puts it beside its place. Places come in the order of
-        // the pixels, without those that see no floor.
-        let mut seen = project(&words).into_iter().peekable();
-        for (word, near) in words.iter().zip(near) {
-            let Some(seen) = seen.next_if(|seen| seen.word == word.id) else { continue };
-            let (x, y) = place(word.id);
-            let (right, down) = lie.pixels(x - seen.x, y - seen.y);
-            let (u, v) = (f64::from(word.u) + right, f64::from(word.v) + down);
-            if let Some(colour) = mean_around(frame, (u, v), box_px) {
-                tile.picture.put_pixel(word.id % TILE_PX, word.id / TILE_PX, colour);
-                tile.near[word.id as usize] = near;
-                tile.is_changed = true;
+        let mut is_better = false;
+        for (column, row) in blocks {
+            let around = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, down)| corner(column + right, row + down));
+            if let [Some(a), Some(b), Some(c), Some(d)] = around {
+                is_better |= tile.add_block((column * BLOCK_PX, row * BLOCK_PX), [a, b, c, d], frame, box_px);
             }
         }
-        tile.seen_s = t_s;
+        if is_better {
+            (tile.is_changed, tile.seen_s) = (true, t_s);
+        } else if tile.seen() == 0 {
+            self.tiles.remove(&at);
+        }
     }
 
     /// The tiles that have settled at mission time `t_s` and have enough that is new.
@@ -258,21 +265,59 @@ impl Mosaic {
     }
 }
 
-/// The mean colour of a square of pixels around a point of a frame; `None` beyond its edge.
-fn mean_around(frame: &RgbImage, (u, v): (f64, f64), edge: i64) -> Option<Rgb<u8>> {
-    let (width, height) = (i64::from(frame.width()), i64::from(frame.height()));
-    // Far beyond the edge, there is no pixel.
-    let first = |at: f64| (at - edge as f64 / 2.0).round().clamp(-1e6, 1e6) as i64;
-    let (left, top) = (first(u), first(v));
-    let (mut sum, mut pixels) = ([0_u32; 3], 0);
-    for y in top.max(0)..(top + edge).min(height) {
-        for x in left.max(0)..(left + edge).min(width) {
-            let pixel = frame.get_pixel(x as u32, y as u32);
-            (0..3).for_each(|c| sum[c] += u32::from(pixel.0[c]));
-            pixels += 1;
+/// Where the corners of the blocks of a tile lie in a frame, pixels, row by row; `None` beyond its edge, and where it sees no floor.
+fn corners(
+    at: TilePlace,
+    edge_m: f64,
+    frame: &RgbImage,
+    lie: &Lie,
+    project: &impl Fn(&[Word]) -> Vec<Observation>,
+) -> Vec<Option<(f64, f64)>> {
+    let (west, north, pitch) =
+        (f64::from(at.0) * edge_m, f64::from(at.1 + 1) * edge_m, edge_m / f64::from(CORNERS - 1));
+    let place = |id: u32| (west + f64::from(id % CORNERS) * pitch, north - f64::from(id / CORNERS) * pitch);
+    let (right, down) = lie.pixels(pitch, pitch);
+    let margin = right.abs().max(down.abs());
+    let is_near = |at: f64, edge: u32| -margin < at && at < f64::from(edge) + margin;
+    let words = (0..CORNERS * CORNERS).filter_map(|id| {
+        let (u, v) = lie.pixel_of(place(id));
+        (is_near(u, frame.width()) && is_near(v, frame.height())).then_some(Word { id, u: u as f32, v: v as f32 })
+    });
+    let words: Vec<Word> = words.collect();
+    let mut corners = vec![None; (CORNERS * CORNERS) as usize];
+    if words.is_empty() {
+        return corners;
+    }
+    // A second step of Newton's method: a pixel is moved by what the camera puts it beside its place. Places come in the order of the
+    // pixels, without those that see no floor.
+    let mut seen = project(&words).into_iter().peekable();
+    for word in words {
+        let Some(seen) = seen.next_if(|seen| seen.word == word.id) else { continue };
+        let (x, y) = place(word.id);
+        let (right, down) = lie.pixels(x - seen.x, y - seen.y);
+        let corner = (f64::from(word.u) + right, f64::from(word.v) + down);
+        corners[word.id as usize] = Some(corner).filter(|(u, v)| u.is_finite() && v.is_finite());
+    }
+    corners
+}
+
+/// The mean colour of a square of pixels around a point in a frame.
+fn mean_around(frame: &RgbImage, (u, v): (f64, f64), edge: u32) -> Rgb<u8> {
+    let range = |at: f64, end: u32| {
+        let first = ((at - f64::from(edge) / 2.0 + 0.5).max(0.0) as u32).min(end.saturating_sub(1));
+        first as usize..(first + edge).min(end) as usize
+    };
+    let (across, down) = (range(u, frame.width()), range(v, frame.height()));
+    let pixels = (across.len() * down.len()).max(1) as u32;
+    let mut sum = [0_u32; 3];
+    for y in down {
+        let row = y * frame.width() as usize;
+        let row = frame.as_raw().get(3 * (row + across.start)..3 * (row + across.end)).unwrap_or_default();
+        for pixel in row.chunks_exact(3) {
+            (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
         }
     }
-    (pixels > 0).then(|| Rgb(sum.map(|sum| (sum / pixels) as u8)))
+    Rgb(sum.map(|sum| (sum / pixels) as u8))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ pub enum DropReason {
     Version,
     /// The frame is addressed to another end.
     NotForUs,
-    /// The frame is damaged, of another mission, or for an earlier run of ours.
+    /// The frame is damaged, of another mission or key, or for an earlier run of ours.
     Checksum,
     /// A field or a chunk makes no sense.
     Malformed,

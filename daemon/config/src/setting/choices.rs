@@ -228,6 +228,9 @@ impl From<MapCells> for CellBand {
 impl ModemKind {
     /// Whether what is written goes to the other end as it is, so that no modem answers.
     pub fn is_pipe(self) -> bool {
-        !matches!(self, Self::S2c | Self::Micromodem)
+        match self {
+            Self::Tcp | Self::Udp | Self::Transparent => true,
+            Self::S2c | Self::Micromodem => false,
+        }
     }
 }

@@ -30,6 +30,17 @@ pub enum Speaker {
     Login,
 }
 
+impl Speaker {
+    /// The make of a modem of this kind; none at the end of a pipe.
+    pub fn of(kind: ModemKind) -> Option<Self> {
+        match kind {
+            ModemKind::S2c => Some(Self::S2c),
+            ModemKind::Micromodem => Some(Self::Micromodem),
+            ModemKind::Tcp | ModemKind::Udp | ModemKind::Transparent => None,
+        }
+    }
+}
+
 /// What is wrong at a port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PortFinding {
@@ -197,11 +208,7 @@ impl PortListener {
 
     /// What is wrong by what has come in so far, if the modem is not ready.
     pub fn finding(&self) -> PortFinding {
-        let own = match self.kind {
-            ModemKind::S2c => Some(Speaker::S2c),
-            ModemKind::Micromodem => Some(Speaker::Micromodem),
-            _ => None,
-        };
+        let own = Speaker::of(self.kind);
         match self.speaker {
             _ if self.text + self.other == 0 => PortFinding::Silent,
             Some(speaker) if Some(speaker) != own => PortFinding::Speaks(speaker),
