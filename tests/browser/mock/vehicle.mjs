@@ -208,7 +208,7 @@ export class Vehicle {
       in_force: { utility: "known", settings: "none", budget: "known", limits: this.inForce.limits ? "known" : "none", fence: this.inForce.fence ? "known" : "none", areas: this.inForce.areas ? "known" : "none", destination: this.inForce.destination ? "known" : "none", ...this.knownInForce },
       fence_in_force: this.inForce.fence ?? null, limits_in_force: this.inForce.limits ?? null,
       areas_in_force: this.inForce.areas ?? null, destination_in_force: this.inForce.destination?.order.place ? this.inForce.destination : null,
-      directive: this.directive.json(), link: this.link(nowS), usbl: null, markers: this.markers,
+      directive: this.directive.json(), link: this.link(nowS), floor: { images: 0, bytes: 0, version: 0, epoch: 0 }, usbl: null, markers: this.markers,
     };
   }
 

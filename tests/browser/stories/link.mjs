@@ -39,6 +39,24 @@ export default [
     },
   },
   {
+    name: "the budget says what its shares bring, also before they are set",
+    async run(s) {
+      const [map, exemplar, free] = [0, 1, 2].map((i) => s.page.locator(".shares .brings").nth(i));
+      const says = async (line) => bits(await line.innerText());
+      await s.until("a report of the vehicle", async () => /current/.test(await says(map)));
+      assert.match(await says(exemplar), /^(an image takes|.*: image in) about /);
+      assert.match(await says(free), /images of the sea floor/);
+      const before = Number(/about (\d+) s/.exec(await says(exemplar))[1]);
+      await s.page.locator('.budget ~ input[type="range"]').first().evaluate((slider) => {
+        slider.value = 0.25;
+        slider.dispatchEvent(new Event("input"));
+      });
+      const after = /about (?:(\d+) min )?(\d+) s, now \d+ s/.exec(await says(exemplar));
+      assert.ok(after && 60 * Number(after[1] ?? 0) + Number(after[2]) > before, await says(exemplar));
+      assert.equal(s.posts.length, 0);
+    },
+  },
+  {
     name: "a new budget is sent and its status shown",
     ends: true,
     async run(s) {

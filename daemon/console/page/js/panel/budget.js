@@ -9,6 +9,7 @@ import { replacedNote } from "../order/sent-versions.js";
 import { orderStatus, slotOf } from "../order/status.js";
 import { store } from "../store.js";
 import { backgroundBox } from "./background.js";
+import { bought, broughtText } from "./bought.js";
 import { classHelp } from "./class-help.js";
 
 const CLASSES = ["directive", "status", "fix", "map", "exemplar"];
@@ -32,9 +33,10 @@ const bar = h("div.stack", { "aria-hidden": "true" });
 const free = h("span.free");
 const rows = Object.fromEntries(CLASSES.map((c, i) => [c, shareRow(c, i)]));
 const rest = h("output.value");
+const brings = Object.fromEntries(["map", "exemplar", "free"].map((c) => [c, h("p.brings")]));
 const shareBox = h("div.shares", { role: "group", "aria-label": "Minimum shares of the classes" },
-  h("h3", {}, "Minimum shares, %"), bar, ...CLASSES.map((c) => rows[c].row),
-  h("div.share-row", { title: "The rest, for whatever is waiting" }, h("span.swatch"), h("span", {}, "free"), h("span"), rest));
+  h("h3", {}, "Minimum shares, %"), bar, ...CLASSES.flatMap((c) => [rows[c].row, ...(brings[c] ? [brings[c]] : [])]),
+  h("div.share-row", { title: "The rest, for whatever is waiting" }, h("span.swatch"), h("span", {}, "free"), h("span"), rest), brings.free);
 const streams = backgroundBox(() => value().background, (background) => {
   clearTimeout(timer);
   order.set(store.vehicle, { ...value(), background });
@@ -137,12 +139,22 @@ export function refreshBudget() {
   if (document.activeElement !== slider || !order.isChanged(vehicle)) slider.value = placeOf(bps);
   slider.setAttribute("aria-valuetext", rate(bps));
   refreshShares(shares);
+  refreshBrings(vehicle);
   streams.refresh(background);
   text(errorLine, error ?? "");
   replaced.update(vehicle);
   const slot = slotOf(vehicle, "budget");
   show(status.node, slot !== null || waiting !== null);
   status.update(slot, waiting);
+}
+
+/** What a share brings now, and what it would bring as it is edited. */
+function refreshBrings(vehicle) {
+  const [now, then] = [read(), value()].map((at) => bought(vehicle, at));
+  for (const [c, node] of Object.entries(brings)) {
+    show(node, now !== null);
+    if (now !== null) text(node, broughtText(then[c], now[c]));
+  }
 }
 
 function refreshShares(shares) {
