@@ -287,6 +287,11 @@ impl FrameBuilder {
         usize::from(self.turn.is_some()) + usize::from(self.has_remaining_byte())
     }
 
+    /// Whether it has no chunk yet.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.last_chunk.is_none()
+    }
+
     /// Adds a chunk; returns whether it fitted.
     pub fn push(&mut self, kind: ChunkKind, payload: &[u8]) -> bool {
         let (at, room) = (self.bytes.len(), self.room());

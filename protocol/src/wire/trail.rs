@@ -61,6 +61,11 @@ impl Trail {
         (!trail.0.is_empty()).then_some(trail)
     }
 
+    /// The number of corners.
+    pub(crate) fn len(&self) -> usize {
+        self.0.len()
+    }
+
     /// The bytes on the wire.
     pub fn encode(&self) -> Vec<u8> {
         let mut bits = BitWriter::default();

@@ -149,6 +149,16 @@ fn each_frame_that_a_free_modem_carries_first_acknowledges() {
 }
 
 #[test]
+fn frames_for_which_a_cycle_has_no_room_are_not_lost() {
+    let setup = Setup { access: Access::Polled, cycle_frames: 1, ..Setup::new(64, 10_000, Codec::Png) };
+    let mut pair = LinkedEnds::new(3, setup, STILL);
+    pair.run(pair.now + Duration::from_secs(300), false);
+    let stats = pair.surface.vehicle(auv()).unwrap().stats().clone();
+    assert_eq!((stats.frames_lost, stats.outgoing.loss.share()), (0, 0.0));
+    assert!(stats.frames_delivered > 10 && stats.frames_delivered <= stats.frames_sent, "{stats:?}");
+}
+
+#[test]
 fn settings_that_differ_are_named_at_both_ends() {
     let common = || Setup::new(64, 10_000, Codec::Png).keyed(true, false);
     let origin = |lat_deg| Setup { origin: Some(MapOrigin::from_degrees(lat_deg, 5.0)), ..common() };

@@ -2,7 +2,7 @@
 //! Micromodem.
 
 use super::fleet::Discovery;
-use super::peer::Ready;
+use super::peer::{Ready, TurnPlan};
 use super::{SurfaceEvent, SurfaceLink};
 use crate::directive::SlotId;
 use crate::link::handshake::FramePurpose;
@@ -37,7 +37,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let next = match self.config.modem.access {
             access if access.is_free() => self.fleet.next_without_turn(),
             _ if !self.in_modem.is_empty() => None,
-            Access::Polled if !self.turn.is_empty() => self.cycle_gives_up_at(),
+            Access::Polled if self.has_cycle() => self.cycle_gives_up_at(),
             _ => {
                 self.discovery.listens_until(now).or_else(|| self.fleet.next_turn(self.discovery.next_wakeup(now), now))
             }
@@ -58,36 +58,43 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 
     /// Writes the next turn for the vehicle that is due; returns whether there is one.
-    pub(super) fn begin_turn(&mut self, now: Instant) -> bool {
+    fn begin_turn(&mut self, now: Instant) -> bool {
         // A discovery call goes first: vehicles that always have a backlog would never leave time for it.
         if self.begin_call(now) {
             return true;
         }
-        let Some(vehicle) = self.fleet.choose(now) else { return false };
+        let Some(planned) = self.plan_turn(now) else { return false };
+        self.write_turn(&planned, now);
+        true
+    }
+
+    /// Plans the next turn for the vehicle that is due, which begins with it.
+    fn plan_turn(&mut self, now: Instant) -> Option<PlannedTurn> {
+        let vehicle = self.fleet.choose(now)?;
         let active = self.fleet.active();
         let is_plentiful = self.budget.is_plentiful(now);
-        let Some(peer) = self.fleet.get_mut(vehicle) else { return false };
-        let modem = self.config.modem;
-        let purpose = match is_hello_due(peer.master.unanswered()) || peer.is_full() {
-            true => FramePurpose::Hello,
-            false if peer.seems_elsewhere() => FramePurpose::Hello,
-            false if peer.is_proof_due() => FramePurpose::Proof,
-            false => FramePurpose::Content,
-        };
+        let (peer, modem) = (self.fleet.get_mut(vehicle)?, self.config.modem);
+        let purpose = peer.turn_purpose();
         let copies = if is_plentiful { peer.stats().outgoing.loss.copies(TURN_LOSS_RISK, 6) } else { 1 };
         let mut plan = peer.plan_turn(&modem, purpose, copies, &self.shares, now);
         let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem, purpose), now)));
         if affordable == 0 {
             let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem, purpose));
             peer.master.postpone(self.budget.earliest(bits, now));
-            return false;
+            return None;
         }
         plan.truncate(affordable);
         let grant = peer.master.grant(&modem, active);
-        self.turn = peer.write_turn(&plan, &modem, Some(grant), purpose, now).into();
         peer.master.begin(grant, now);
         self.fleet.set_current(vehicle);
-        true
+        Some(PlannedTurn { vehicle, plan, purpose, grant })
+    }
+
+    fn write_turn(&mut self, planned: &PlannedTurn, now: Instant) {
+        let PlannedTurn { vehicle, plan, purpose, grant } = planned;
+        if let Some(peer) = self.fleet.get_mut(*vehicle) {
+            self.turn = peer.write_turn(plan, &self.config.modem, Some(*grant), *purpose, now).into();
+        }
     }
 
     /// Queues a discovery call if one is due.
@@ -121,10 +128,15 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 }
 
-/// A vehicle that does not answer may have restarted and not know us: every second grant is a hello, and after a while
-/// every one, so that the numbers of unacknowledged frames do not run out.
-fn is_hello_due(unanswered: u32) -> bool {
-    unanswered >= 2 && (unanswered.is_multiple_of(2) || unanswered >= 16)
+/// A turn that is not yet written.
+#[derive(Debug)]
+struct PlannedTurn {
+    vehicle: Address,
+    /// The slots of each frame.
+    plan: TurnPlan,
+    purpose: FramePurpose,
+    /// The turn byte.
+    grant: u8,
 }
 
 /// The modem must request the frames of our cycle within this time.
@@ -148,6 +160,9 @@ pub(super) struct Cycles {
     wanted: Option<Cycle>,
     /// Frames that the modem has requested and not received yet.
     polled: u32,
+    /// The turn of our cycle, which is written when the modem requests its frames: one with a number that never goes out would
+    /// count as lost.
+    planned: Option<PlannedTurn>,
     /// The vehicle whose cycle follows ours.
     answer_of: Option<Address>,
     /// When our last cycle was due to begin.
@@ -166,25 +181,40 @@ impl<R: StateReplica> SurfaceLink<R> {
     /// The cycle to begin next, if it is time for one ([`crate::mac::Access::Polled`]).
     #[must_use]
     pub fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
+        if self.config.modem.access != Access::Polled {
+            return None;
+        }
         if let Some(cycle) = self.cycle.wanted.take() {
             return Some(cycle);
         }
-        if !self.turn.is_empty() && self.in_modem.is_empty() && now.since(self.cycle.began) >= GIVE_UP {
+        if self.has_cycle() && self.in_modem.is_empty() && now.since(self.cycle.began) >= GIVE_UP {
             self.give_up_cycle(now);
         }
-        if !self.in_modem.is_empty() || !self.turn.is_empty() || !self.begin_turn(now) {
+        if !self.in_modem.is_empty() || self.has_cycle() {
             return None;
         }
+        let (to, frames) = if self.begin_call(now) {
+            (Address::EVERYBODY, self.turn.len())
+        } else {
+            let planned = self.plan_turn(now)?;
+            let of = (planned.vehicle, planned.plan.len());
+            self.cycle.planned = Some(planned);
+            of
+        };
         self.cycle.began = now;
-        let to = self.turn.front()?.transmit.to;
         self.cycle.answer_of = to.is_vehicle().then_some(to);
-        Some(Cycle { from: Address::SURFACE, to, frames: self.turn.len() as u32 })
+        Some(Cycle { from: Address::SURFACE, to, frames: frames as u32 })
+    }
+
+    /// Whether the modem has yet to request frames of a cycle of ours.
+    fn has_cycle(&self) -> bool {
+        !self.turn.is_empty() || self.cycle.planned.is_some()
     }
 
     /// Gives up a cycle of which the modem has requested no frame.
     fn give_up_cycle(&mut self, now: Instant) {
         self.turn.clear();
-        (self.cycle.polled, self.cycle.answer_of) = (0, None);
+        (self.cycle.planned, self.cycle.polled, self.cycle.answer_of) = (None, 0, None);
         if let Some(peer) = self.fleet.current_mut() {
             peer.master.postpone(now);
         }
@@ -192,20 +222,27 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// When a cycle is given up that the modem has not begun.
     pub(super) fn cycle_gives_up_at(&self) -> Option<Instant> {
-        (!self.turn.is_empty()).then(|| self.cycle.began + GIVE_UP)
+        self.has_cycle().then(|| self.cycle.began + GIVE_UP)
     }
 
     /// The modem requests `frames` frames of the surface's own cycle.
     pub fn handle_poll(&mut self, frames: u32) {
         self.cycle.polled = frames;
-        // Frames that do not fit into the cycle are dropped; the next cycle carries what is current by then.
-        while self.turn.len() > frames.max(1) as usize {
-            self.turn.pop_back();
-        }
     }
 
     pub(super) fn poll_polled(&mut self, now: Instant) -> Option<Transmit> {
         self.cycle.polled = self.cycle.polled.checked_sub(1)?;
+        if let Some(mut planned) = self.cycle.planned.take() {
+            let peer = self.fleet.get_mut(planned.vehicle)?;
+            // Frames may have come in since it was planned.
+            planned.purpose = peer.possible(planned.purpose);
+            // What does not fit into the cycle is in the next one, as it is current by then.
+            planned.plan.truncate(self.cycle.polled as usize + 1);
+            let bits = |slots| (peer.bits(slots, &self.config.modem, planned.purpose), now);
+            let affordable = self.budget.affordable(planned.plan.iter().map(|slots| bits(slots)));
+            planned.plan.truncate(affordable);
+            self.write_turn(&planned, now);
+        }
         let ready = self.turn.pop_front()?;
         let last = self.turn.is_empty();
         if last {

@@ -37,6 +37,8 @@ pub(super) struct StatusSender {
     /// Slot with which the next report begins: a report that does not fit into a frame continues in the next.
     report_from: usize,
     copies: Copies,
+    /// Whether a pose that is due has let a frame pass that had no room for its trail.
+    has_waited: bool,
 }
 
 /// How often a pose and a report that are due are sent, each in a frame of its own.
@@ -52,7 +54,8 @@ impl StatusSender {
     pub(super) fn new(period: Duration, now: Instant) -> Self {
         let copies = Copies { each: 1, poses: 1, reports: 1 };
         let sent = [None; 3];
-        Self { period, status: None, pose_due: now, report_due: now, sent, reported: None, report_from: 0, copies }
+        let (status, reported, report_from, has_waited) = (None, None, 0, false);
+        Self { period, status, pose_due: now, report_due: now, sent, reported, report_from, copies, has_waited }
     }
 
     /// Sends each pose and each report in so many frames, as far as the share of the budget allows it. Where the ends take
@@ -158,7 +161,15 @@ impl StatusSender {
         // The path, the registration and the trail may take a hundredth of the budget each, in all copies together.
         let share = period.as_secs_f64() * f64::from(status.budget_bps) / 800.0 / f64::from(self.copies.each);
         let share = share as usize;
-        let details = self.details(status, share, builder.room(), now)?.encode();
+        let details = self.details(status, share, builder.room(), now)?;
+        // From a pose at the end of a full frame, the surface would not learn how the vehicle came there.
+        let corners = |trail: &Option<Trail>| trail.as_ref().map_or(0, Trail::len);
+        if !self.has_waited && !builder.is_empty() && corners(&details.trail) < corners(&self.trail(status, share, now))
+        {
+            self.has_waited = true;
+            return None;
+        }
+        let details = details.encode();
         let mut length = 0;
         if !details.is_empty() {
             length += builder.push(ChunkKind::Details, &details).then_some(details.len())?;
@@ -169,6 +180,7 @@ impl StatusSender {
             return None;
         }
         length += bytes.len();
+        self.has_waited = false;
         let pose = bytes.len().min(VehicleStatus::POSE);
         if self.copies.poses > 1 {
             self.copies.poses -= 1;
@@ -278,6 +290,24 @@ mod tests {
             }
         }
         sent
+    }
+
+    #[test]
+    fn a_pose_lets_one_full_frame_pass_for_its_trail() {
+        let trail = (1..8).map(|i| TrailCorner { ago_s: 4 * i, place: MapPoint::new(f64::from(i), f64::from(i % 2)) });
+        let status = VehicleStatus { budget_bps: 10_000, trail: trail.collect(), ..VehicleStatus::default() };
+        let mut sender = StatusSender::new(Duration::from_secs(15), Instant::ZERO);
+        sender.set(status);
+        let full = || {
+            let mut builder = builder(64);
+            assert!(builder.push(ChunkKind::Map, &[1; 30]));
+            builder
+        };
+        assert_eq!(sender.fill_pose(&mut full(), Instant::ZERO), None);
+        assert!(sender.is_due(Instant::ZERO));
+        assert!(sender.fill_pose(&mut full(), Instant::ZERO).is_some(), "it waits once");
+        let mut sender = StatusSender { has_waited: false, pose_due: Instant::ZERO, ..sender };
+        assert!(sender.fill_pose(&mut builder(64), Instant::ZERO).is_some(), "no frame has more room");
     }
 
     #[test]

@@ -291,7 +291,7 @@ impl LinkedEnds {
         let delay = if of_vehicle { self.channel.propagation } else { Duration::ZERO };
         if is_received {
             let at = self.now + delay + Duration::from_millis(300);
-            self.schedule(at, PairEvent::Poll { of_vehicle, frames: cycle.frames.min(8) });
+            self.schedule(at, PairEvent::Poll { of_vehicle, frames: cycle.frames.min(self.setup.cycle_frames) });
         }
     }
 

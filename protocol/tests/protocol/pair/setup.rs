@@ -37,6 +37,8 @@ pub(crate) struct Setup {
     pub(crate) budget_bps: u32,
     pub(crate) codec: Codec,
     pub(crate) access: Access,
+    /// The most frames that a modem requests in its cycle.
+    pub(crate) cycle_frames: u32,
     pub(crate) authenticity: Option<Authenticity>,
     pub(crate) origin: Option<MapOrigin>,
     /// The longest time between two discovery calls; `None`: there are none.
@@ -55,6 +57,7 @@ impl Setup {
             budget_bps,
             codec,
             access: Access::Shared,
+            cycle_frames: 8,
             authenticity: None,
             origin: None,
             discovery: None,

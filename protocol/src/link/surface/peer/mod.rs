@@ -13,7 +13,7 @@ mod view;
 
 pub use in_force::InForce;
 pub use strangers::{EndedRun, OtherSurface};
-pub(super) use turn::{Ready, room_for_slot};
+pub(super) use turn::{Ready, TurnPlan, room_for_slot};
 pub use view::PeerView;
 
 use crate::directive::{

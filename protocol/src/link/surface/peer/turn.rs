@@ -49,9 +49,31 @@ struct FrameContent<'a> {
 type Beside = (ChunkKind, Vec<u8>);
 
 /// The slots of each frame of a turn.
-pub(super) type TurnPlan = Vec<Vec<PendingSlot>>;
+pub(in crate::link::surface) type TurnPlan = Vec<Vec<PendingSlot>>;
 
 impl<R: StateReplica> VehiclePeer<R> {
+    /// What a turn that begins now is for.
+    pub(in crate::link::surface) fn turn_purpose(&self) -> FramePurpose {
+        if is_hello_due(self.master.unanswered()) || self.is_full() || self.seems_elsewhere() {
+            FramePurpose::Hello
+        } else if self.is_proof_due() {
+            FramePurpose::Proof
+        } else {
+            FramePurpose::Content
+        }
+    }
+
+    /// A purpose, or the one in its place that can be written now.
+    pub(in crate::link::surface) fn possible(&self, purpose: FramePurpose) -> FramePurpose {
+        match purpose {
+            FramePurpose::Proof if self.pair.has_offer() => FramePurpose::Proof,
+            FramePurpose::Proof | FramePurpose::Content if self.pair.has_run() && !self.is_full() => {
+                FramePurpose::Content
+            }
+            _ => FramePurpose::Hello,
+        }
+    }
+
     /// Plans a turn: the slots that wait and were not sent after `again_before`, then a grant. Each is repeated as
     /// often as it takes for one copy to get through.
     pub(in crate::link::surface) fn plan_turn(
@@ -186,6 +208,12 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
         Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind: mainly, contents }, number }
     }
+}
+
+/// A vehicle that does not answer may have restarted and not know us: every second grant is a hello, and after a while
+/// every one, so that the numbers of unacknowledged frames do not run out.
+fn is_hello_due(unanswered: u32) -> bool {
+    unanswered >= 2 && (unanswered.is_multiple_of(2) || unanswered >= 16)
 }
 
 /// Puts slots into as few frames as their order allows: commands before fixes, unless fixes are owed their share.
