@@ -133,10 +133,10 @@ impl DiveVehicle {
         states.take_while(|(at_s, _)| *at_s <= to_s).find(|(_, goes)| !goes).map(|(at_s, _)| *at_s)
     }
 
-    /// The share of the cells of its map that have one of these labels.
-    fn share_of_map(&self, labels: &BTreeSet<u8>) -> String {
+    /// The share of the cells of its map that have one of these labels, 0 to 1.
+    fn share_of_map(&self, labels: &BTreeSet<u8>) -> f64 {
         let theirs = self.map.labels.iter().filter(|(_, label)| labels.contains(label)).count();
-        format!("{:.0} %", theirs as f64 / self.map.labels.explored().max(1) as f64 * 100.0)
+        theirs as f64 / self.map.labels.explored().max(1) as f64
     }
 }
 
@@ -192,14 +192,17 @@ impl Dive {
         let path = match (vehicle.is_played_back(), vehicle.own.track.len() > 1) {
             (true, _) => "Its path was that of the recording that was played back: no order could change it.",
             (_, true) => "By its own record.",
-            (_, false) => "By the places that it reported, and straight lines between them.",
+            (_, false) => {
+                "By the places that it reported and straight lines between them, so that shares and times are rough; in force from when the \
+                 surface learned it."
+            }
         };
         let _ = writeln!(
             page,
-            "<h3>What came of these orders</h3>\n<table><thead><tr><th>what was ordered</th><th>in force from (UTC)</th><th>to</th>\
-             <th>where the vehicle was meanwhile</th></tr></thead>\n{rows}</table>\n<p>{path} Labels are those of the map at the end, each by \
-             itself, as the order weighed them. Other orders may have been in force at the same time: one to hold, or to go to a place, goes \
-             before weights.</p>"
+            "<h3>What came of these orders</h3>\n<p>{path} Labels are those of the map at the end, each by itself, as the order weighed them, \
+             without those that were merged into it. Other orders may have been in force at the same time: one to hold, or to go to a place, \
+             goes before weights.</p>\n<table><thead><tr><th>what was ordered</th><th>in force from (UTC)</th><th>to</th>\
+             <th>where the vehicle was meanwhile</th></tr></thead>\n{rows}</table>"
         );
     }
 }
@@ -218,7 +221,7 @@ struct Goal<'a> {
     place: String,
     is_favoured: bool,
     /// Its share of the map at the end, where it is one of labels.
-    of_map: Option<String>,
+    of_map: Option<f64>,
     has: Box<dyn Fn(&TrackPoint) -> bool + 'a>,
 }
 
@@ -251,17 +254,22 @@ impl Way<'_> {
         // A surface alone does not know the first mode.
         let surveys = |at_s: f64| modes.at(at_s).is_none_or(|mode| mode == VehicleMode::Survey.name());
         let told = goals.iter().flatten().map(|goal| {
+            let wish = if goal.is_favoured { "favoured" } else { "to be avoided" };
+            if goal.of_map == Some(0.0) {
+                return format!("{}, {wish}: not known, as the map at the end has none of it", goal.place);
+            }
             let [stay, before] = [self.span_s, (f64::NEG_INFINITY, self.span_s.0)]
                 .map(|span_s| self.vehicle.stay(span_s, surveys, &goal.has));
             if stay.all_s <= 0.0 {
                 return "it did not survey meanwhile, as far as its places tell".to_owned();
             }
-            let wish = if goal.is_favoured { "favoured" } else { "to be avoided" };
             let first = stay.first_s.filter(|_| goal.is_favoured);
-            let first =
-                first.map_or_else(String::new, |at_s| format!(", first {} after it was applied", self.since(at_s)));
+            let first = first.map_or_else(String::new, |at_s| match at_s - self.span_s.0 < 1.0 {
+                true => ", where it was already".to_owned(),
+                false => format!(", first {} after it was applied", self.since(at_s)),
+            });
             let before = (before.all_s > 0.0).then(|| format!("before the order: {}", before.percent()));
-            let of_map = goal.of_map.as_ref().map(|share| format!("of the map at the end: {share}"));
+            let of_map = goal.of_map.as_ref().map(|share| format!("of the map at the end: {:.0} %", share * 100.0));
             let beside: Vec<String> = before.into_iter().chain(of_map).collect();
             let beside = if beside.is_empty() { String::new() } else { format!(" ({})", beside.join("; ")) };
             format!("{}, {wish}: {} of the time in which it surveyed{beside}{first}", goal.place, stay.percent())
@@ -285,7 +293,9 @@ impl Way<'_> {
     /// Whether it arrived at a place, which ends the order.
     fn arrival(&self, [east_m, north_m]: [f64; 2]) -> Option<(String, f64)> {
         let away = |point: &TrackPoint| (point.east_m - east_m).hypot(point.north_m - north_m);
-        let nearest_m = self.places().map(away).reduce(f64::min)?;
+        let Some(nearest_m) = self.places().map(away).reduce(f64::min) else {
+            return Some(("not known: no place of it in that time is".to_owned(), self.span_s.1));
+        };
         let arrived_s = self.vehicle.stay(self.span_s, |_| true, |point| away(point) <= ARRIVED_M).first_s;
         if let Some(at_s) = arrived_s {
             let after = self.since(at_s);

@@ -25,9 +25,9 @@ pub(super) fn heard(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
             dive.lasted(before_end_s)
         ),
     };
-    let surface = format!("At the surface {}", age(dive, &vehicle.heard_s, dive.surface_s.1));
+    let surface = format!("At the surface, {}", age(dive, &vehicle.heard_s, dive.surface_s.1));
     let own = vehicle.own.runs_s.last().map(|run| {
-        format!("On board, of what it could use of the surface, {}", age(dive, &vehicle.own.heard_s, run.1))
+        format!("On board, of frames of the surface that it could use: {}", age(dive, &vehicle.own.heard_s, run.1))
     });
     [last, surface].into_iter().chain(own).collect()
 }
@@ -83,7 +83,7 @@ fn age(dive: &Dive, times_s: &[f64], end_s: f64) -> String {
         0 => "no frame was heard.".to_owned(),
         1 => "one frame was heard.".to_owned(),
         _ => format!(
-            "the last frame that was heard was at most {} old half of the time.",
+            "half of the time, the last frame was heard at most {} before.",
             dive.lasted_tenths(half_of_time_s(times_s, end_s))
         ),
     }
@@ -172,7 +172,8 @@ mod tests {
         let mut vehicle = DiveVehicle { heard_s: times, ..DiveVehicle::default() };
         let at_surface = "the surface heard nothing from it until 1970-01-01T00:01:00Z, for 30 s (60 s of the mission)";
         assert_eq!(told(&dive, &vehicle), [(30.0, at_surface.to_owned())]);
-        let age = "At the surface the last frame that was heard was at most 0.7 s (1.4 s of the mission) old half of the time.";
+        let age =
+            "At the surface, half of the time, the last frame was heard at most 0.7 s (1.4 s of the mission) before.";
         assert_eq!(heard(&dive, &vehicle)[1], age);
         vehicle.own.runs_s = vec![(0.0, 100.0)];
         vehicle.own.heard_s = (0..=100).filter(|s| !(26..62).contains(s)).map(f64::from).collect();

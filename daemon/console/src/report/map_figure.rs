@@ -3,10 +3,10 @@
 use super::Escaped;
 use super::chart::{WIDTH, round_length};
 use super::dive::DiveVehicle;
+use super::map_cells::ClassCells;
 use scenecast_core::Area;
 use scenecast_protocol::map::Rect;
 use scenecast_surface::state::VehicleState;
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Characters of a marker's text on the map.
@@ -30,8 +30,8 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area
         "<svg viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"map of the sea floor\" xmlns=\"http://www.w3.org/2000/svg\">\n",
         frame.height_px() + 40.0
     );
-    let classes = classes(bounds, state, vehicle);
-    cells(&mut svg, &frame, bounds, &classes, state, vehicle);
+    let class_cells = ClassCells::new(&frame, bounds, state, vehicle);
+    class_cells.draw(&mut svg);
     grid(&mut svg, &frame);
     if let Some(corners) = corners {
         let _ = writeln!(svg, "<polygon class=\"area\" points=\"{}\"/>", points(&frame, corners.into_iter()));
@@ -44,7 +44,7 @@ pub(super) fn map(state: &VehicleState, vehicle: &DiveVehicle, area: Option<Area
         text += if marker.text.chars().count() > MAX_MARKER { "\u{2026}" } else { "" };
         point(&mut svg, &frame, (marker.x_m, marker.y_m), (&text, -5.0), &mut texts);
     }
-    numbers(&mut svg, &frame, bounds, &classes, (state, vehicle), &mut texts);
+    class_cells.number(&mut svg, &mut texts);
     scale(&mut svg, &frame);
     svg += "</svg>";
     Some(svg)
@@ -103,41 +103,6 @@ impl Frame {
     /// A round length of about a fifth of the width, metres.
     fn step_m(&self) -> f64 {
         round_length((self.east - self.west) / 5.0)
-    }
-}
-
-/// The class of each cell of a part of the map, row by row from the south; 0 is none.
-fn classes(Rect { x, y, width, height }: Rect, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<u8> {
-    let labels = vehicle.map.labels.copy_area(i64::from(x), i64::from(y), width as usize, height as usize);
-    labels.into_iter().map(|label| state.label_book.shown_as(label)).collect()
-}
-
-/// Cells of one class side by side in a row are one rectangle.
-fn cells(svg: &mut String, frame: &Frame, bounds: Rect, classes: &[u8], state: &VehicleState, vehicle: &DiveVehicle) {
-    let shift = state.map.shift_m();
-    let edge = vehicle.map.cell_m;
-    let mut runs: BTreeMap<u8, String> = BTreeMap::new();
-    for (row, classes) in classes.chunks(bounds.width.max(1) as usize).enumerate() {
-        let north = (f64::from(bounds.y) + row as f64 + 1.0) * edge + shift.1;
-        let mut column = 0;
-        for run in classes.chunk_by(|a, b| a == b) {
-            if let Some(&class) = run.first().filter(|class| **class != 0) {
-                let west = (f64::from(bounds.x) + column as f64) * edge + shift.0;
-                let (x, y) = frame.place(west, north);
-                let path = runs.entry(class).or_default();
-                let (width, height) = (run.len() as f64 * edge * frame.px_m, edge * frame.px_m);
-                // Writing to a string cannot fail.
-                let _ = write!(path, "M{x:.2} {y:.2}h{width:.2}v{height:.2}h-{width:.2}z");
-            }
-            column += run.len();
-        }
-    }
-    for (label, path) in runs {
-        let _ = writeln!(
-            svg,
-            "<path fill=\"{}\" shape-rendering=\"crispEdges\" d=\"{path}\"/>",
-            state.label_book.colour_text(label)
-        );
     }
 }
 
@@ -202,23 +167,24 @@ fn track(svg: &mut String, frame: &Frame, vehicle: &DiveVehicle, texts: &mut Tex
     let path = vehicle.path();
     let began = path.iter().zip(path.iter().skip(1)).filter(|(a, b)| vehicle.began_between(a, b));
     let restarts = began.map(|(_, after)| (Some(after), "restart"));
-    for (place, name) in [(path.first(), "start"), (path.last(), "end")].into_iter().chain(restarts) {
+    let ends = if vehicle.own.track.len() > 1 { ["start", "end"] } else { ["first report", "last report"] };
+    for (place, name) in [(path.first(), ends[0]), (path.last(), ends[1])].into_iter().chain(restarts) {
         place.into_iter().for_each(|place| point(svg, frame, (place.east_m, place.north_m), (name, -5.0), texts));
     }
 }
 
 /// The rooms of the texts on a map, pixels: left, top, right, bottom.
 #[derive(Default)]
-struct Texts(Vec<[f64; 4]>);
+pub(super) struct Texts(Vec<[f64; 4]>);
 
 impl Texts {
     /// The width of a character at the most, the height of a line, and the room between texts.
-    const CHARACTER: f64 = 7.5;
+    pub(super) const CHARACTER: f64 = 7.5;
     const APART: f64 = 5.0;
     const LINE: f64 = 13.0;
 
     /// Takes the room of a text from its left end and its base line on; false where another one is.
-    fn take(&mut self, text: &str, (left, base): (f64, f64)) -> bool {
+    pub(super) fn take(&mut self, text: &str, (left, base): (f64, f64)) -> bool {
         let room = [left, base - Self::LINE + 2.0, left + text.chars().count() as f64 * Self::CHARACTER, base + 2.0];
         let meets = |other: &[f64; 4]| {
             room[0] < other[2] + Self::APART
@@ -256,78 +222,6 @@ fn point(
     );
 }
 
-/// Most cells of a map whose classes are numbered.
-const MAX_NUMBERED: u64 = 1 << 22;
-
-/// The least room for a number, and how far numbers of one class are apart, pixels.
-const NUMBER_ROOM: f64 = 7.0;
-const NUMBERS_APART: f64 = 110.0;
-
-/// The number of each class where it is wide, so that classes can be told apart in grey.
-fn numbers(
-    svg: &mut String,
-    frame: &Frame,
-    bounds: Rect,
-    classes: &[u8],
-    (state, vehicle): (&VehicleState, &DiveVehicle),
-    texts: &mut Texts,
-) {
-    if bounds.area() > MAX_NUMBERED {
-        return;
-    }
-    let (shift, edge) = (state.map.shift_m(), vehicle.map.cell_m);
-    let cell_px = edge * frame.px_m;
-    let (room, apart) = ((NUMBER_ROOM / cell_px).ceil() as u32, NUMBERS_APART / cell_px);
-    for (class, (column, row)) in wide_places(classes, bounds.width as usize, room, apart) {
-        let middle = |from: i32, cell: usize, shift: f64| (f64::from(from) + cell as f64 + 0.5) * edge + shift;
-        let (x, y) = frame.place(middle(bounds.x, column, shift.0), middle(bounds.y, row, shift.1));
-        let (number, base) = (class.to_string(), y + 4.0);
-        let left = x - number.len() as f64 * Texts::CHARACTER / 2.0;
-        if texts.take(&number, (left, base)) {
-            let _ = writeln!(
-                svg,
-                "<text class=\"number\" x=\"{x:.1}\" y=\"{base:.1}\" text-anchor=\"middle\">{number}</text>"
-            );
-        }
-    }
-}
-
-/// Columns and rows of cells of each class that are far, along both axes, from the ends of their runs: the farthest of all, and those with
-/// at least so much room, `apart` cells from each other; 0 is no class.
-fn wide_places(classes: &[u8], width: usize, least_room: u32, apart: f64) -> Vec<(u8, (usize, usize))> {
-    let height = classes.len() / width.max(1);
-    let mut room = vec![u32::MAX; classes.len()];
-    // The lengths so far of runs in each of the four directions.
-    let mut measure = |line: &mut dyn Iterator<Item = usize>| {
-        let (mut before, mut length) = (0, 0);
-        for cell in line {
-            length = if classes[cell] == before { length + 1 } else { 1 };
-            before = classes[cell];
-            room[cell] = room[cell].min(length);
-        }
-    };
-    for row in 0..height {
-        measure(&mut (0..width).map(|column| row * width + column));
-        measure(&mut (0..width).rev().map(|column| row * width + column));
-    }
-    for column in 0..width {
-        measure(&mut (0..height).map(|row| row * width + column));
-        measure(&mut (0..height).rev().map(|row| row * width + column));
-    }
-    let mut found: BTreeMap<u8, Vec<(usize, usize)>> = BTreeMap::new();
-    let mut cells: Vec<usize> = (0..classes.len()).filter(|cell| classes[*cell] != 0).collect();
-    cells.sort_by_key(|cell| (std::cmp::Reverse(room[*cell]), *cell));
-    for cell in cells {
-        let (column, row) = (cell % width, cell / width);
-        let places = found.entry(classes[cell]).or_default();
-        let is_far = |&(x, y): &(usize, usize)| (x.abs_diff(column) as f64).hypot(y.abs_diff(row) as f64) >= apart;
-        if places.is_empty() || room[cell] >= least_room && places.iter().all(is_far) {
-            places.push((column, row));
-        }
-    }
-    found.into_iter().flat_map(|(class, places)| places.into_iter().map(move |place| (class, place))).collect()
-}
-
 pub(super) fn scale(svg: &mut String, frame: &Frame) {
     let (length, y) = (frame.step_m(), frame.height_px() + 28.0);
     let (end, right) = (10.0 + length * frame.px_m, WIDTH - 14.0);
@@ -347,16 +241,6 @@ pub(super) fn scale(svg: &mut String, frame: &Frame) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_class_is_numbered_where_it_is_wide() {
-        let map = "1111111 1333111 1333220 1333222 1111222";
-        let classes: Vec<u8> = map.bytes().filter(u8::is_ascii_digit).map(|digit| digit - b'0').collect();
-        assert_eq!(wide_places(&classes, 7, 9, 1.0), [(1, (0, 0)), (2, (5, 3)), (3, (2, 2))]);
-        let far = wide_places(&classes, 7, 1, 5.0);
-        assert_eq!(far.iter().filter(|(class, _)| *class == 1).count(), 2, "{far:?}");
-        assert_eq!(wide_places(&[], 0, 1, 1.0), []);
-    }
 
     #[test]
     fn texts_do_not_run_into_each_other() {

@@ -14,6 +14,7 @@ mod images;
 mod in_force;
 mod link;
 mod log;
+mod map_cells;
 mod map_figure;
 mod maps;
 mod order_step;

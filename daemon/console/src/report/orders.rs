@@ -218,7 +218,7 @@ impl Dive {
         }
         // A surface logs changes alone.
         if has_modes && vehicle.own.runs_s.is_empty() {
-            let unknown = "this record does not have the mode before the first change of it below";
+            let unknown = "its mode from here to the first change below is not known";
             steps.push((self.surface_s.0, unknown.to_owned()));
         }
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -291,7 +291,7 @@ mod tests {
         let told = |vehicle: &DiveVehicle| {
             let mut page = String::new();
             dive.steering(&mut page, &state, vehicle);
-            page.contains("surveying").then(|| page.contains("does not have the mode before"))
+            page.contains("surveying").then(|| page.contains("to the first change below is not known"))
         };
         assert_eq!(told(&vehicle), Some(true));
         vehicle.own.runs_s = vec![(0.0, 9.0)];

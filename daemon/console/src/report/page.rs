@@ -18,7 +18,7 @@ use std::sync::LazyLock;
 const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
 table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;vertical-align:top;padding:.25em .6em;\
 border-bottom:1px solid #ccc}p,li{max-width:50em}td.n{text-align:right;white-space:nowrap}td.t{white-space:nowrap}td.o{min-width:15em}.wide{font-size:.8em}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
-svg text{font:11px system-ui,sans-serif}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
+svg text{font:11px system-ui,sans-serif}.border{stroke:#000;stroke-opacity:.55;stroke-width:.7;fill:none}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.area{fill:none;stroke:#000;stroke-dasharray:1 4}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
 vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:188px}.images svg{width:112px}.images img{width:112px;display:block;\

@@ -48,7 +48,7 @@ impl SetBack {
                 ", with the whole map of its record, which may lack the last seconds before".to_owned()
             }
             (cells, kept) => format!(
-                ", with {kept} of the {cells} cells of its map as before: on board, changes of the last {} of its record before that were lost",
+                ", with {kept} of the {cells} cells of its map as they were: the program had not stored what changed in the last {} of its record",
                 dive.mission_lasted(self.lost_s.max(dive.mission_s(1.0)))
             ),
         }
@@ -89,7 +89,7 @@ mod tests {
         let told = |after: &[(i32, u8)]| set_back(after).told(&dive);
         assert_eq!(set_back(&[(0, 1), (1, 1), (2, 1)]), SetBack { cells: 4, kept: 2, lost_s: 30.0 });
         let late = told(&[(0, 2), (1, 1), (2, 1)]);
-        assert!(late.contains("3 of the 4 cells") && late.contains("changes of the last 10 s of"), "{late}");
+        assert!(late.contains("3 of the 4 cells") && late.contains("what changed in the last 10 s of"), "{late}");
         assert_eq!(
             told(&[(0, 2), (1, 1), (2, 1), (3, 4)]),
             ", with the whole map of its record, which may lack the last seconds before"

@@ -34,7 +34,7 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
     let told = |(at_s, event): &(f64, Event)| (*at_s, words::event(&state.label_book, event));
     let restart = |who: &str, (from_s, to_s): (f64, f64), map: String| {
         let (again, lasted) = (utc_text(to_s), dive.lasted(to_s - from_s));
-        (from_s, format!("{who} record stops; its program ran again from {again}, {lasted} later{map}"))
+        (from_s, format!("{who} record stops; its program ran again from {again}, about {lasted} later{map}"))
     };
     let mut found: Vec<(f64, String)> = of_it().filter(|(_, event)| is_trouble(event)).map(told).collect();
     found.extend(faults(dive, state));

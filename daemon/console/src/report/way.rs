@@ -45,7 +45,9 @@ pub(super) fn equipment(dive: &Dive, vehicle: &DiveVehicle) -> String {
     let planner = all.settings.get("survey.planner").and_then(Value::as_str).unwrap_or(defaults.survey.planner.name());
     let way = match planner == PlannerKind::Lawnmower.name() {
         true => "in straight legs".to_owned(),
-        false => format!("in straight legs and, once weights were ordered, by the planner {planner}"),
+        false => format!(
+            "in straight legs and, once weights were ordered, by the planner {planner} unless another was ordered"
+        ),
     };
     format!(
         "{images}By its settings it was to survey {} m above the sea floor at {} m/s {way}, with camera images whose pixels are {} m \
@@ -63,9 +65,11 @@ pub(super) fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) ->
         || "the mission has no latitude and longitude".to_owned(),
         |origin| format!("the origin is at {}", words::origin(origin)),
     );
+    let has_own = vehicle.own.track.len() > 1;
     let begin = vehicle.path().first().map_or_else(String::new, |first| {
         format!(
-            " It began {} and {} of the origin{}",
+            " {} {} and {} of the origin{}",
+            if has_own { "It began" } else { "The first place that it reported is" },
             words::east(first.east_m),
             words::north(first.north_m),
             on_earth(dive, (first.east_m, first.north_m))
@@ -76,13 +80,13 @@ pub(super) fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) ->
         (Some(deep), Some(rising)) => format!("at {deep} below the surface until it rose to it, and at {rising} then"),
         (one, other) => format!("at {} below the surface", one.or(other).unwrap_or_default()),
     };
-    let least = if vehicle.own.track.len() > 1 { "at" } else { "no slower than" };
+    let (least, ended) = if has_own { ("at", "and ended") } else { ("at least", "the last one is") };
     let speed =
         vehicle.speed_m_s().map_or_else(String::new, |m_s| format!(", {least} {m_s:.2} m/s on average while it moved"));
     let jumps = jumps(vehicle);
     format!(
-        "By its {} about {:.0} m{jumps}{speed}, {depth}.{begin}, and ended {} and {} of the origin{}; {origin}.{}{}",
-        if vehicle.own.track.len() > 1 { "own record it went" } else { "reports it went at least" },
+        "By its {} about {:.0} m{jumps}{speed}, {depth}.{begin}, {ended} {} and {} of the origin{}; {origin}.{}{}",
+        if has_own { "own record it went" } else { "reports it went at least" },
         vehicle.distance_m(),
         words::east(last.east_m),
         words::north(last.north_m),

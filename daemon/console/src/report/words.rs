@@ -47,8 +47,9 @@ pub(super) fn label(book: &LabelBook, label: u8) -> String {
 pub(super) fn unused(frames: &FrameCounts) -> String {
     let causes = frames.dropped.iter().map(|(reason, count)| match reason.as_str() {
         "duplicate" => counted(*count as usize, "copy of a known frame", "copies of known frames"),
-        "checksum" => format!("{count} damaged, of another run or of another mission"),
-        other => format!("{count} dropped for {other}"),
+        "checksum" => format!("{count} that were damaged, of another run or of another mission"),
+        "truncated" => format!("{count} that were cut short"),
+        other => format!("{count} refused ({})", other.replace('_', " ")),
     });
     match frames.unused() {
         0 => "none".to_owned(),
@@ -201,7 +202,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             let told = |area: &Value| format!("weight {} ({})", value_in_words(&area["weight"]), corners(area));
             let all: Vec<String> = areas.iter().map(told).collect();
             if all.is_empty() {
-                return Some("no area, so that what was ordered before ends".to_owned());
+                return Some("none any more".to_owned());
             }
             Some(format!("{}: {}", counted(areas.len(), "area", "areas"), all.join("; ")))
         }
@@ -226,7 +227,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
     // What a budget has to spare comes last.
     all.sort_by_key(|(name, _)| *name == "background");
     let all: Vec<String> = all.into_iter().filter_map(member).collect();
-    if all.is_empty() { "nothing, so that what was ordered before ends".to_owned() } else { all.join("; ") }
+    if all.is_empty() { "withdrawn".to_owned() } else { all.join("; ") }
 }
 
 /// The count with its noun: `one` where it is 1, otherwise `several`.

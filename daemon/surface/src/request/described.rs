@@ -59,7 +59,7 @@ pub(super) fn describe(
         ),
         R::Settings(id, settings) => order(*id, format!("settings: {}", members(settings))),
         R::Again(id, slot, _) => order(*id, format!("{} sent again", name_of_order(*id, *slot))),
-        R::Restore(id) => order(*id, "the lost orders are sent again".into()),
+        R::Restore(id) => order(*id, "orders that the vehicle may have lost are to be sent again".into()),
         R::TakeOver(id) => order(*id, "the vehicle is taken over from another surface".into()),
         R::Budget(budget) => (None, LogKind::Order, format!("budget: {} bit/s", budget.budget_bps)),
         R::Label(id, order) => record(*id, label(order)),
@@ -75,7 +75,7 @@ pub(super) fn describe(
 /// The name, the colour and the merging of a label, as an edit leaves them.
 fn label(order: &LabelOrder) -> String {
     let name = order.name.as_ref().map(|name| format!("name {name}"));
-    let name = name.or_else(|| order.merged_into.is_none().then(|| "no name, not merged".to_owned()));
+    let name = name.or_else(|| order.merged_into.is_none().then(|| "has no name, is merged into none".to_owned()));
     let colour = order.colour.as_ref().map(|colour| format!("colour {colour}"));
     let merged = order.merged_into.map(|into| format!("merged into label {into}"));
     let all: Vec<String> = [name, colour, merged].into_iter().flatten().collect();
