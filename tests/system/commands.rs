@@ -122,6 +122,7 @@ fn every_command_has_help_with_an_example() {
         &["ctl", "label"],
         &["ctl", "mark", "set"],
         &["ctl", "utility", "set"],
+        &["ctl", "utility", "try"],
         &["ctl", "budget", "set"],
         &["ctl", "exemplar"],
         &["ctl", "log"],

@@ -16,8 +16,11 @@
 //! |---|---|
 //! | [`LinkHost`] | any end of the link and a modem station; the only caller of a link's `poll_transmit` |
 //! | [`VehicleHost`] | the vehicle's role, its modem and autopilot, persistence, the mapper |
+//! | `DryRunTask` | the surface's knowledge and the vehicle's planner: what the vehicle would do |
 //! | `SurfaceHost` | the surface's role, its modem, the instruments and the autopilot of the surface vehicle |
 
+#[cfg(feature = "surface")]
+mod dry_run;
 mod link_end;
 mod link_host;
 mod pilot;
@@ -25,6 +28,8 @@ mod pilot;
 mod surface_host;
 mod vehicle_host;
 
+#[cfg(feature = "surface")]
+pub use crate::dry_run::DryRunTask;
 #[cfg(feature = "surface")]
 pub use crate::surface_host::{Follower, SurfaceHost, SurfaceHostEvent};
 pub use crate::vehicle_host::{CameraPose, MeasuredPose, VehicleHost, VehicleHostEvent};

@@ -4,6 +4,8 @@ mod camera;
 mod checkpoint;
 mod clock;
 mod doctor;
+#[cfg(feature = "surface")]
+mod dry_runs;
 mod durable;
 mod equipment;
 #[cfg(feature = "surface")]
@@ -30,6 +32,8 @@ mod store;
 mod surface_process;
 mod vehicle_process;
 
+#[cfg(feature = "surface")]
+pub use crate::dry_runs::DryRuns;
 #[cfg(feature = "surface")]
 pub use crate::surface_process::{host_name, run_surface};
 pub use crate::vehicle_process::run_vehicle;

@@ -1,6 +1,7 @@
 //! `scenecast asv`: ports, page, files and clock around the surface's host.
 
 use super::clock::{Clock, utc_hours};
+use super::dry_runs::DryRuns;
 use super::instruments::{Instruments, relay};
 use super::map_files::{MapFile, MapFiles};
 use super::modem::{self, ModemPort, warn_without_key};
@@ -96,6 +97,7 @@ struct SurfaceShell {
     facts: MissionFacts,
     meter: LinkMeter,
     record: SurfaceRecord,
+    dry_runs: DryRuns,
     /// Held while an archived map or the record is read.
     reading: Arc<Mutex<()>>,
     reload: Reload,
@@ -157,6 +159,7 @@ impl SurfaceShell {
             facts,
             meter,
             record,
+            dry_runs: DryRuns::new(config.clone()),
             reading: Arc::default(),
             reload,
             budget: configured_budget(config),
@@ -241,6 +244,10 @@ impl SurfaceShell {
             return self.report(reply);
         }
         let now = self.clock.now();
+        if matches!(request.request, SurfaceRequest::DryRun(..)) {
+            let surface = self.host.surface();
+            return self.dry_runs.answer(surface, &request.request, self.facts.cell_m, now, reply);
+        }
         self.files.commit(self.host.surface_mut(), None, now);
         let by = request.by.as_ref().map(|by| by.name().to_owned());
         let answer = match &request.request {

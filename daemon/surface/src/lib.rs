@@ -3,6 +3,7 @@
 //! Whoever shows the surface to others publishes a [`Snapshot`] after each change, and hands it their requests by
 //! [`handle_request`] between two steps. Therefore no client can delay the link.
 
+mod aims;
 mod annotations;
 mod assemble;
 mod command;
@@ -33,6 +34,7 @@ mod surface;
 mod track;
 mod vehicle_record;
 
+pub use aims::{Ground, Place, Purpose};
 pub use annotations::{AnnotationRefusal, Annotations};
 pub use assemble::{assemble, link_config};
 pub use command::{

@@ -37,6 +37,8 @@ pub enum OrderRefusal {
     Budget(u32),
     #[error("shares add up to {0} percent: allowed is 100 or less")]
     Shares(u32),
+    #[error("the vehicle has not reported its place yet")]
+    NoPlaceYet,
     #[error("label {0} is not on the map")]
     NotOnMap(u8),
     #[error(

@@ -13,7 +13,7 @@ use crate::orders::{
 use crate::record::StoredLabel;
 use crate::snapshot::command_state;
 use crate::state::{
-    AcceptedOrder, ArchivedMap, CellHistory, CommandState, FloorList, ReplayEventList, ReplayOrder, ReplayState,
+    AcceptedOrder, ArchivedMap, CellHistory, CommandState, DryRun, FloorList, ReplayEventList, ReplayOrder, ReplayState,
 };
 use crate::{
     AreasOrder, CommandAction, DestinationOrder, FenceOrder, Giver, LimitsOrder, LogEntry, OrderKind, OrderRefusal,
@@ -54,6 +54,9 @@ pub enum SurfaceRequest {
     FloorImage(u8, FloorPlace),
     /// Read the settings that fit a budget in bit/s, by default the share of the map.
     Fit(u8, Option<f64>),
+    /// Plan what the vehicle would do by weights of labels, of unexplored cells and of curiosity, which are not sent. The owner
+    /// of the vehicle's planner handles this request.
+    DryRun(u8, BTreeMap<u8, f64>, (f64, f64)),
     /// Send the weights of labels, and those of unexplored cells and of curiosity.
     Utility(u8, BTreeMap<u8, f64>, (f64, f64)),
     /// Request an image of a label, or cancel the request.
@@ -113,7 +116,7 @@ impl SurfaceRequest {
     pub fn order_kind(&self) -> Option<OrderKind> {
         match self {
             Self::Map(_) | Self::FormerLabels(..) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
-            Self::Floor(..) | Self::FloorImage(..) => None,
+            Self::Floor(..) | Self::FloorImage(..) | Self::DryRun(..) => None,
             Self::Log | Self::Archives | Self::ArchivedMap(_) | Self::Replay(_) | Self::ReplayEvents => None,
             Self::Report | Self::Barred(..) => None,
             Self::Label(..)
@@ -150,6 +153,7 @@ pub enum Reply {
     File(&'static str, Vec<u8>),
     /// Settings that fit a budget.
     Fit(Box<Fit>),
+    DryRun(Box<DryRun>),
     /// The order was accepted and waits for its turn.
     Accepted(AcceptedOrder),
     /// The surface has done what was requested.
@@ -336,7 +340,9 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         }
         SurfaceRequest::Log => Reply::Log(surface.log().entries().cloned().collect()),
         SurfaceRequest::Archives => Reply::Archives(Vec::new()),
-        SurfaceRequest::FormerLabels(..) | SurfaceRequest::ArchivedMap(_) => return None,
+        SurfaceRequest::FormerLabels(..) | SurfaceRequest::ArchivedMap(_) | SurfaceRequest::DryRun(..) => {
+            return None;
+        }
         SurfaceRequest::Replay(_) | SurfaceRequest::ReplayEvents | SurfaceRequest::Report => return None,
         // Handled with their principal, before.
         SurfaceRequest::Command(_) | SurfaceRequest::Barred(..) => return None,

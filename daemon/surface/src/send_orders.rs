@@ -20,6 +20,20 @@ impl Surface {
         (exploration, curiosity): (f64, f64),
         now: Instant,
     ) -> Result<u16, OrderRefusal> {
+        let (utility, highest) = self.utility_of(vehicle, weights, (exploration, curiosity))?;
+        let record = self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?;
+        record.orders.utility = utility.clone();
+        record.orders.weighed = highest;
+        self.issue(vehicle, Slot::Utility(utility), now)
+    }
+
+    /// The utility of these weights, and the highest label that they may name.
+    pub fn utility_of(
+        &self,
+        vehicle: Address,
+        weights: &BTreeMap<u8, f64>,
+        (exploration, curiosity): (f64, f64),
+    ) -> Result<(Utility, u8), OrderRefusal> {
         let known = match weights.is_empty() {
             true => BTreeMap::new(),
             false => self.labels_for_orders(vehicle)?,
@@ -27,6 +41,7 @@ impl Surface {
         let mut utility = Utility {
             exploration: hundredths(Weighed::Exploration, exploration)?,
             curiosity: hundredths(Weighed::Curiosity, curiosity)?,
+            epoch: self.records.get(&vehicle).ok_or(IssueError::NoVehicle)?.epoch,
             ..Utility::default()
         };
         // A label may have lost its last cell since the operator looked at the map.
@@ -41,11 +56,7 @@ impl Surface {
                 utility.weights.insert(label, weight);
             }
         }
-        let record = self.records.get_mut(&vehicle).ok_or(IssueError::NoVehicle)?;
-        utility.epoch = record.epoch;
-        record.orders.utility = utility.clone();
-        record.orders.weighed = highest;
-        self.issue(vehicle, Slot::Utility(utility), now)
+        Ok((utility, highest))
     }
 
     /// Orders a vehicle to hold, or to continue.

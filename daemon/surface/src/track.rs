@@ -17,6 +17,8 @@ pub struct Track {
 }
 
 impl Track {
+    /// The time over which the speed is measured: several legs, with the turns between them.
+    const SPEED_S: f64 = 30.0;
     /// The most positions that are kept.
     pub(crate) const MAX_POINTS: usize = 500;
 
@@ -27,6 +29,21 @@ impl Track {
 
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = (Instant, f64, f64)> + ExactSizeIterator + '_ {
         self.points.iter().copied()
+    }
+
+    /// The speed over the last [`Self::SPEED_S`] seconds, metres a second; `None` if the track is shorter.
+    pub fn speed_m_s(&self) -> Option<f64> {
+        let &(end, ..) = self.points.back()?;
+        let (mut metres, mut after) = (0.0, *self.points.back()?);
+        for &point in self.points.iter().rev() {
+            metres += (after.1 - point.1).hypot(after.2 - point.2);
+            let seconds = end.since(point.0).as_secs_f64();
+            if seconds >= Self::SPEED_S {
+                return Some(metres / seconds);
+            }
+            after = point;
+        }
+        None
     }
 
     /// The number of positions so far, those that were dropped included.

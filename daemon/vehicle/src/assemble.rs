@@ -32,9 +32,7 @@ pub fn assemble(
     for layer in layers(config, codec) {
         link.add_layer(layer);
     }
-    let planner = config.survey.planner;
-    let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m)
-        .with_end(config.survey.at_end);
+    let steering = steering(config, area, cell_m(config));
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let drift = config.navigation.drift_percent / 100.0;
@@ -57,6 +55,12 @@ pub fn assemble(
     Ok(vehicle)
 }
 
+/// The choice of waypoints within `area`, as configured, on a map with cells of `cell_m` metres.
+pub fn steering(config: &Config, area: Area, cell_m: f64) -> Steering {
+    let survey = &config.survey;
+    Steering::new(area, footprint(config), cell_m, survey.planner, survey.clearance_m).with_end(survey.at_end)
+}
+
 /// The configured end of the link.
 pub fn link_config(
     config: &Config,
@@ -77,7 +81,8 @@ pub fn link_config(
     })
 }
 
-fn footprint(config: &Config) -> Footprint {
+/// The extent of a camera frame on the sea floor, as configured.
+pub fn footprint(config: &Config) -> Footprint {
     let mpp = config.camera.metres_per_pixel;
     Footprint {
         across: f64::from(config.camera.width_px) * mpp,

@@ -23,7 +23,7 @@ mod steering;
 mod track;
 mod vehicle;
 
-pub use assemble::{assemble, link_config};
+pub use assemble::{assemble, footprint, link_config, steering};
 pub use changes::{LabelChanges, MapChanges, MapProducer, SeenCell, SeenFrame, SharedExemplars};
 pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};

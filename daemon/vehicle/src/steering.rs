@@ -27,7 +27,7 @@ pub struct Footprint {
 
 impl Footprint {
     /// Metres around the centre that are visible at any heading.
-    fn reach(&self) -> f64 {
+    pub fn reach(&self) -> f64 {
         self.across.min(self.along) / 2.0
     }
 

@@ -125,6 +125,17 @@ function tiles({ mission }, req, res, vehicle) {
   res.end(bytes);
 }
 
+/** A dry run to the east, to the label that is favoured most. */
+function dryRun({ weights }) {
+  const label = Number(Object.entries(weights).sort(([, a], [, b]) => b - a)[0]?.[0] ?? 1);
+  const at = { reason: "label", label };
+  return {
+    from: [0, 0], legs: [{ to: [6, 0], ...at }, { to: [6, 6], reason: "unseen", label: null }], targets: [[0, 8, 12]],
+    first: { ...at, at: [4, 0], along_m: 4, arrival_s: 60 }, metres: 12, at_s: 0,
+    text: `With these weights the vehicle would go to label ${label}.`, rests_on: "It rests on the surface's map.",
+  };
+}
+
 async function post(mock, req, res, path) {
   if (req.headers["x-scenecast"] !== "1") return reply(res, 403, { error: "header X-Scenecast is missing" });
   const { mission } = mock;
@@ -136,6 +147,7 @@ async function post(mock, req, res, path) {
     reply(res, refused?.[0] ?? 200, refused ? { error: refused[1] } : mission.command.json());
     return emit(mock, "state", mission.json());
   }
+  if (path.endsWith("/dry-run")) return reply(res, 200, dryRun(given));
   const isRecord = /\/(labels|draft|notes|dismiss|markers|markers\/remove)$/.test(path);
   const kind = path.endsWith("/settings") ? "settings" : ["hold", "abort"].includes(given.action) ? "stop" : "order";
   const refused = isRecord ? null : mission.command.refusal(by, kind);

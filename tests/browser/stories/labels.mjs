@@ -37,6 +37,21 @@ async function firstImage(s) {
 
 export default [
   {
+    name: "a dry run is shown until the weights change, and sends nothing",
+    scenario: "rich",
+    async run(s) {
+      await firstLabels(s);
+      await s.page.locator("#label-list input[type=range]").first().focus();
+      await s.page.keyboard.press("ArrowRight");
+      await s.page.locator("#try-weights").click();
+      await s.shows(".dry-run", /Dry run, not sent.*would go to label/s);
+      assert.ok(!s.posts.some((p) => p.path.endsWith("/utility")), "an order was sent");
+      await s.page.locator("#label-list input[type=range]").first().focus();
+      await s.page.keyboard.press("ArrowRight");
+      await s.until("the dry run is gone", async () => !(await s.page.locator(".dry-run").isVisible()));
+    },
+  },
+  {
     name: "the first mission follows the state, and stays closed once it is closed",
     long: true,
     scenario: "rich",

@@ -63,7 +63,7 @@ section! {
         /// Rows of a frame.
         height_px: u32 = 480, range(64.0, 4096.0, "pixel"), [Scenario];
         /// Size of a pixel on the sea floor.
-        metres_per_pixel: f64 = 0.01, range(0.0001, 10.0, "m"), [Auv Scenario];
+        metres_per_pixel: f64 = 0.01, range(0.0001, 10.0, "m"), [Auv Asv Scenario];
         /// Place of a live camera on the vehicle: metres forward, to starboard and down from the point whose pose is measured.
         mount_m: [f64; 3] = [0.0, 0.0, 0.0], range(-20.0, 20.0, "m"), [Auv];
         /// Direction of a live camera: rotation of the image's upper edge from the bow, clockwise from above; then tilt of the

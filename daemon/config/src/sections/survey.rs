@@ -12,19 +12,21 @@ section! {
     survey: Survey {
         /// Mission time at which the survey ends. 0: never.
         duration_s: f64 = 1200.0, range(0.0, 1e7, "s"), [Auv Scenario];
-        /// Speed over ground.
-        speed_m_s: f64 = 0.5, range(0.01, 10.0, "m/s"), [Auv Scenario];
+        /// Speed over ground. At the surface, this key and the others of the survey and of the camera are for dry runs only: the
+        /// vehicle does not tell them.
+        speed_m_s: f64 = 0.5, range(0.01, 10.0, "m/s"), [Auv Asv Scenario];
         /// Height of the camera above the sea floor.
         altitude_m: f64 = 4.0, range(0.1, 100.0, "m"), [Auv Scenario];
         /// Depth of the sea floor.
         depth_m: f64 = 20.0, range(0.0, 11_000.0, "m"), [Auv Scenario];
         /// West, south, east and north limits in the world. All 0: the limits of the recording
-        /// or of the rehearsal's mosaic; of the world "reef", 30 x 25 m in its middle.
-        area_m: Option<Area> = None, range(-1e6, 1e6, "m"), [Auv Scenario];
+        /// or of the rehearsal's mosaic; of the world "reef", 30 x 25 m in its middle; for a dry run of the surface, those of the
+        /// fence or of the map.
+        area_m: Option<Area> = None, range(-1e6, 1e6, "m"), [Auv Asv Scenario];
         /// Least overlap of camera frames on neighbouring legs, in percent of a frame's width across the track. Registration
         /// needs 10 % of overlap to close loops between legs. Legs are never further apart than nine tenths of a frame's
         /// shorter side, so that 30 % changes nothing for a frame of 4:3, and brings the legs of a square one closer.
-        leg_overlap_percent: f64 = 30.0, range(0.0, 90.0, "%"), [Auv Scenario];
+        leg_overlap_percent: f64 = 30.0, range(0.0, 90.0, "%"), [Auv Asv Scenario];
         /// File of a fence for a vehicle that has no orders from before its start: GeoJSON, as scenecast ctl fence set takes
         /// it. Empty: none.
         fence_file: Option<PathBuf> = None, ANY, [Auv];
@@ -32,14 +34,14 @@ section! {
         /// operator orders it to resume; free: it surveys.
         start: StartMode = StartMode::Hold, ANY, [Auv];
         /// Planner of the vehicle's path once the operator has sent a utility. The operator may choose another.
-        planner: PlannerKind = PlannerKind::Horizon, ANY, [Auv Scenario];
+        planner: PlannerKind = PlannerKind::Horizon, ANY, [Auv Asv Scenario];
         /// What an adaptive survey does once no look pays any more. repeat: it explores the rest of the area, then looks at
         /// the favoured labels again; explore: it explores the rest, then holds; hold: it holds. The operator may choose
         /// another.
-        at_end: AtEnd = AtEnd::Repeat, ANY, [Auv Scenario];
+        at_end: AtEnd = AtEnd::Repeat, ANY, [Auv Asv Scenario];
         /// Distance that planned paths keep from the fence and from keep-outs, to allow for the
         /// vehicle's size, turns and drift.
-        clearance_m: f64 = 1.0, range(0.0, 1000.0, "m"), [Auv Scenario];
+        clearance_m: f64 = 1.0, range(0.0, 1000.0, "m"), [Auv Asv Scenario];
         /// Longest silence of the surface before the reaction in survey.on_silence, unless the operator sets
         /// another limit. 0: no limit.
         max_silence_s: f64 = 0.0, range(0.0, 1e6, "s"), [Auv Scenario];

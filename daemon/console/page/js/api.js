@@ -58,6 +58,8 @@ export const readCellHistory = async (id, x, y) => (await read(`/vehicles/${id}/
 export const readLog = async (since) => (await read(`/log?since=${since}`)).entries;
 /** Keeps weights that are not sent; `exploration` and `curiosity` may be null. They stay at the surface. */
 export const keepDraft = (id, draft) => write(`/vehicles/${id}/draft`, draft);
+/** What the vehicle would do by these weights; nothing is sent to it. */
+export const dryRun = (id, utility) => write(`/vehicles/${id}/dry-run`, utility);
 export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, utility);
 /** `action`: another, larger or cancel; `image`: the number of the image to enlarge. */
 export const requestExemplar = (id, label, action, image = null) =>

@@ -21,7 +21,7 @@ pub use download::{cancel_exemplar, save_exemplar, save_map};
 pub use http::Client;
 pub use orders::{
     AreasFile, BudgetChange, change_command, go, set_areas, set_budget, set_utility, show_areas, show_budget,
-    show_command, show_utility,
+    show_command, show_utility, try_utility,
 };
 pub use session::Session;
 pub use settings::{SettingsChange, change_settings};

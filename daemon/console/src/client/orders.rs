@@ -6,7 +6,7 @@ use super::session::{Session, follow};
 use super::text::{self, span};
 use scenecast_core::UserError;
 use scenecast_files::{AreaShape, CoordinateFrame, read_areas};
-use scenecast_surface::state::{CommandState, MissionState, PrincipalInfo};
+use scenecast_surface::state::{CommandState, DryRun, MissionState, PrincipalInfo, VehicleState};
 use scenecast_surface::{
     AreaOrder, AreasOrder, BudgetOrder, CommandOrder, DestinationOrder, SharesOrder, UtilityOrder,
 };
@@ -54,6 +54,31 @@ pub async fn set_utility(
 ) -> Result<(), UserError> {
     let state = session.state().await?;
     let vehicle = session.choose(&state)?;
+    let order = utility_order(vehicle, weights, exploration, keep)?;
+    let accepted = session.client.post(&format!("/api/v2/vehicles/{}/utility", vehicle.id), &order).await?;
+    follow(session, accepted).await
+}
+
+/// Prints what the vehicle would do by weights, and sends nothing.
+pub async fn try_utility(
+    session: &Session,
+    weights: &[(String, f64)],
+    exploration: Option<f64>,
+    keep: bool,
+) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let vehicle = session.choose(&state)?;
+    let order = utility_order(vehicle, weights, exploration, keep)?;
+    let run: DryRun = session.client.post(&format!("/api/v2/vehicles/{}/dry-run", vehicle.id), &order).await?;
+    session.print(&run, || format!("{}\n{}\n", run.text, run.rests_on))
+}
+
+fn utility_order(
+    vehicle: &VehicleState,
+    weights: &[(String, f64)],
+    exploration: Option<f64>,
+    keep: bool,
+) -> Result<UtilityOrder, UserError> {
     let mut given: BTreeMap<u8, f64> = BTreeMap::new();
     for (text, weight) in weights {
         for label in names::labels(&vehicle.label_book, text)? {
@@ -70,8 +95,7 @@ pub async fn set_utility(
         order.curiosity = vehicle.orders.utility.curiosity;
     }
     order.weights.extend(given.into_iter().map(|(label, w)| (label.to_string(), w)));
-    let accepted = session.client.post(&format!("/api/v2/vehicles/{}/utility", vehicle.id), &order).await?;
-    follow(session, accepted).await
+    Ok(order)
 }
 
 /// Prints the budgets, the shares and the background streams.

@@ -455,7 +455,12 @@ mod tests {
     fn only_readings_and_logins_are_open_to_viewers() {
         for o in operations() {
             let is_open = o.role.is_none_or(|role| role == Role::Viewer);
-            assert_eq!(is_open, o.method == Method::GET || ["login", "logout", "replay"].contains(&o.id), "{}", o.path);
+            assert_eq!(
+                is_open,
+                o.method == Method::GET || ["login", "logout", "replay", "dry_run"].contains(&o.id),
+                "{}",
+                o.path
+            );
             assert_eq!(o.role.is_none(), o.path.starts_with("/log"), "{}", o.path);
         }
     }

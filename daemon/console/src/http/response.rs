@@ -28,6 +28,7 @@ pub(super) fn respond(reply: Reply) -> Response {
         },
         Reply::File(content_type, bytes) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
         Reply::Fit(fit) => Json(*fit).into_response(),
+        Reply::DryRun(run) => Json(*run).into_response(),
         Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
         Reply::Done => StatusCode::NO_CONTENT.into_response(),
         // The handler of the log makes its lines.

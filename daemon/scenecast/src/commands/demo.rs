@@ -10,7 +10,7 @@ use scenecast_core::{Area, UserError, errln, outln};
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{EndEvent, Mission, MissionOptions, Truth};
 use scenecast_runtime::record::{SurfaceRecord, VehicleRecord, unix_nanos};
-use scenecast_runtime::{Stop, block_on, keep_private, random_bits};
+use scenecast_runtime::{DryRuns, Stop, block_on, keep_private, random_bits};
 use scenecast_surface::record::EventTime;
 use scenecast_surface::recorder::Recorder;
 use scenecast_surface::state::{TrueClass, TruthInfo};
@@ -143,6 +143,7 @@ struct RunningDemo {
     counted: [u64; 2],
     published: Option<std::time::Instant>,
     records: (SurfaceRecord, VehicleRecord),
+    dry_runs: DryRuns,
 }
 
 impl RunningDemo {
@@ -159,7 +160,8 @@ impl RunningDemo {
         let (config, folder) = (mission.settings(), Path::new("records"));
         let surface = SurfaceRecord::rehearsed(&config, folder, mission.seed());
         let records = (surface, VehicleRecord::rehearsed(&config, folder, speed, mission.seed()));
-        Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, records }
+        let dry_runs = DryRuns::new(config);
+        Self { meter, pace, truth, mission, facts, recorder, counted: [0; 2], published: None, records, dry_runs }
     }
 
     async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), UserError> {
@@ -225,6 +227,11 @@ impl RunningDemo {
         self.take_truth();
         let mut answers = Vec::new();
         while let Ok((request, reply)) = console.requests.try_recv() {
+            if matches!(request.request, SurfaceRequest::DryRun(..)) {
+                let (surface, now) = (self.mission.surface(), self.mission.now());
+                self.dry_runs.answer(surface, &request.request, self.facts.cell_m, now, reply);
+                continue;
+            }
             answers.push((reply, self.answer(request)));
             changed = true;
         }

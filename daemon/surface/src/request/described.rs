@@ -18,7 +18,7 @@ pub(super) fn describe(
     let order = |id: u8, text: String| (Address::vehicle(id), LogKind::Order, text);
     let record = |id: u8, text: String| (Address::vehicle(id), LogKind::Record, text);
     Some(match request {
-        R::Map(_) | R::FormerLabels(..) | R::Exemplar(..) | R::Fit(..) => return None,
+        R::Map(_) | R::FormerLabels(..) | R::Exemplar(..) | R::Fit(..) | R::DryRun(..) => return None,
         R::Floor(..) | R::FloorImage(..) => return None,
         // A draft changes with each move of a slider.
         R::Draft(..) | R::Log | R::Archives | R::ArchivedMap(_) | R::Command(_) => return None,

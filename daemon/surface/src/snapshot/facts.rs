@@ -27,6 +27,10 @@ pub struct MissionFacts {
     pub ended_s: Option<f64>,
     /// Width of a cell, metres.
     pub cell_m: f64,
+    /// Metres around a vehicle that its camera sees at any heading, as configured at the surface.
+    pub reach_m: f64,
+    /// The configured speed of a vehicle, metres a second.
+    pub survey_m_s: f64,
     /// Longest pause between two turns of an idle link, seconds.
     pub idle_s: f64,
     /// Interval between two contacts to expect before one was measured, seconds.
@@ -54,6 +58,9 @@ impl MissionFacts {
             speed,
             ended_s: None,
             cell_m: config::cell_m(config),
+            reach_m: f64::from(config.camera.width_px.min(config.camera.height_px)) * config.camera.metres_per_pixel
+                / 2.0,
+            survey_m_s: config.survey.speed_m_s,
             idle_s: config.link.max_idle_s,
             first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
             frame_bits: modem.bits_on_air(modem.frame_bytes),

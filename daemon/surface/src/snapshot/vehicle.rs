@@ -5,16 +5,16 @@ use super::{exemplar, facts, link};
 use crate::record::{StoredDraft, StoredMarker, StoredNote};
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, FloorSummary, InForceKnowledge, MapLabel, MapLabelTree, MapSummary,
-    OrderProgress, OrderStatus, OtherSurface, PlannedPath, ReportedDisk, ReportedFault, ReportedPose,
+    OrderProgress, OrderStatus, OtherSurface, PlanAims, PlannedPath, ReportedDisk, ReportedFault, ReportedPose,
     ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote,
     VehicleOrders, VehicleSettings, VehicleState, WeightDraft, seconds,
 };
-use crate::{SettingsOrder, Surface, Track, VehicleRecord, order_name};
+use crate::{Ground, Purpose, SettingsOrder, Surface, Track, VehicleRecord, order_name};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{self, PlannerKind, REPORTED_SLOTS, SlotId, SlotProgress};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleStatus};
+use scenecast_protocol::wire::{Address, DiskReport, FrameTie, Intent, RegistrationReport, VehicleMode, VehicleStatus};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
     let all = surface.vehicles();
@@ -38,6 +38,7 @@ fn vehicle(
         next_contact_s: view.next_contact(now).map(seconds),
         other_surface: other_surface(&view, now),
         status: record.status(&view).map(|(s, at)| status(s, record, &view, *at)),
+        aims: aims(surface, address, record, &view, facts),
         track: track(&record.track),
         registration: record.registration.latest().map(registration),
         closed_loops: track(record.registration.closures()),
@@ -207,6 +208,30 @@ fn status(s: &VehicleStatus, record: &VehicleRecord, view: &PeerView<'_>, at: In
         disk: s.disk.map(disk),
         faults: s.faults.iter().map(|(text, is_grave)| ReportedFault { text: text.to_owned(), is_grave }).collect(),
     }
+}
+
+/// What the reported plan is for.
+fn aims(
+    surface: &Surface,
+    address: Address,
+    record: &VehicleRecord,
+    view: &PeerView<'_>,
+    facts: &MissionFacts,
+) -> Option<PlanAims> {
+    let (status, at) = record.status(view)?;
+    // Weights and plan belong to the current map.
+    let map = surface.map(address).filter(|_| record.earlier_map().is_none())?;
+    let purpose = match status.mode {
+        VehicleMode::Return => Purpose::Return,
+        _ => Purpose::Survey(status.intent),
+    };
+    let waypoints = status.waypoint.into_iter().chain(status.path.points.iter().copied());
+    let legs: Vec<_> = waypoints.map(|to| (to.xy(), purpose)).collect();
+    let cell_m = view.cell_m().unwrap_or(facts.cell_m);
+    let weight = |label| record.weight(label);
+    let ground = Ground { map, cell_m, weight: &weight, reach_m: facts.reach_m };
+    let speed_m_s = record.track.speed_m_s().filter(|v| *v > 0.05).unwrap_or(facts.survey_m_s);
+    (!legs.is_empty()).then(|| ground.aims(status.position.xy(), &legs, seconds(*at), speed_m_s))
 }
 
 fn track(track: &Track) -> Vec<(f64, f64, f64)> {

@@ -18,6 +18,7 @@ import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
 import { showReadout } from "./readout.js";
 import { drawDestination } from "./destination.js";
 import { choosePlace, chosen, clearPlace, drawPlaces } from "./place.js";
+import { drawDryRun } from "./dry-run.js";
 import { TRUTH, drawTruth } from "./truth.js";
 import { View } from "./view.js";
 import { pathOf } from "./path.js";
@@ -135,7 +136,7 @@ const around = (boxes) => boxes.reduce((a, b) => [Math.min(a[0], b[0]), Math.min
 const reach = ([west, south, east, north]) => Math.max(east - west, north - south);
 
 function readInk() {
-  for (const name of ["sea", "text", "grid", "vehicle", "track", "stale", "accent", "fence", "keepout", "bad"]) ink[name] = colour(`map-${name}`);
+  for (const name of ["sea", "text", "grid", "vehicle", "track", "stale", "accent", "fence", "keepout", "bad", "reason-label", "reason-expected", "reason-unseen", "reason-return", "reason-other"]) ink[name] = colour(`map-${name}`);
   redraw();
 }
 
@@ -189,6 +190,7 @@ function draw() {
   for (const v of byChoice) drawOutlines(c, view, ink, v, v.id === store.selectedId);
   for (const v of byChoice) drawDestination(c, view, ink, v);
   for (const v of byChoice) drawVehicle(c, viewOf(view, v), ink, v, v.id === store.selectedId);
+  if (store.vehicle) drawDryRun(c, viewOf(view, store.vehicle), ink, store.vehicle);
   drawPlaces(c, view, ink);
   drawMeasure(c, view, ink);
   if (byKeys()) drawCross(c);

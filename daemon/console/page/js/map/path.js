@@ -6,7 +6,39 @@ export const pathOf = (s) => (s.waypoint ? [[s.x_m, s.y_m], s.waypoint, ...(s.pa
 /** Length in metres. */
 export const lengthOf = (places) => places.slice(1).reduce((sum, [x, y], i) => sum + Math.hypot(x - places[i][0], y - places[i][1]), 0);
 
-export function drawPath(c, view, ink, s, stale) {
+/** The colour of a reason; what has none of its own is drawn as other. */
+const toneOf = (ink, reason) => ink[`reason-${reason}`] || ink["reason-other"];
+
+/** Dashed legs in the colours of their reasons: {to: [x, y], reason}. */
+export function drawLegs(c, view, ink, from, legs, dash, width) {
+  c.lineJoin = "round";
+  for (const isCasing of [true, false]) {
+    let before = from;
+    for (const { to, reason } of legs) {
+      c.strokeStyle = isCasing ? ink.sea : toneOf(ink, reason);
+      c.lineWidth = isCasing ? width + 2.5 : width;
+      dashed(c, isCasing ? [] : dash, [before, to].map(([x, y]) => view.toScreen(x, y)));
+      before = to;
+    }
+  }
+}
+
+/** Lights the cells that a plan leads to: rows of [row, first column, last column]. */
+export function drawTargets(c, view, ink, rows, cell_m) {
+  const before = c.globalAlpha;
+  c.globalAlpha = 0.4 * before;
+  c.fillStyle = ink["reason-label"];
+  for (const [row, first, last] of rows) {
+    const [left, top] = view.toScreen(first * cell_m, (row + 1) * cell_m);
+    const [right, bottom] = view.toScreen((last + 1) * cell_m, row * cell_m);
+    c.fillRect(left, top, right - left, bottom - top);
+  }
+  c.globalAlpha = before;
+}
+
+/** The plan as reported, in the colours of its reasons while it is not stale. */
+export function drawPath(c, view, ink, s, stale, aims = null, cell_m = 0) {
+  if (aims && !stale && s.waypoint) drawTargets(c, view, ink, aims.targets, cell_m);
   const places = pathOf(s).map(([x, y]) => view.toScreen(x, y));
   if (places.length === 0) return;
   const [here, waypoint, ...path] = places;
@@ -22,6 +54,7 @@ export function drawPath(c, view, ink, s, stale) {
     if (s.path_continues && path.length > 0) arrowHead(c, places.at(-2), places.at(-1));
     cross(c, ...waypoint);
   }
+  if (aims && !stale) drawLegs(c, view, ink, [s.x_m, s.y_m], aims.legs, [8, 5], 2.5);
 }
 
 function dashed(c, dashes, places) {

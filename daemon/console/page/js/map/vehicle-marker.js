@@ -13,7 +13,7 @@ export function drawVehicle(c, view, ink, vehicle, chosen) {
   if (vehicle.status) {
     const s = vehicle.status;
     const tone = stale ? ink.stale : ink.vehicle;
-    drawPath(c, view, ink, s, stale);
+    drawPath(c, view, ink, s, stale, vehicle.aims, vehicle.map.cell_m);
     drawSigma(c, view, s, tone);
     drawHull(c, view, ink, s, tone);
     drawName(c, view, ink, vehicle, stale);

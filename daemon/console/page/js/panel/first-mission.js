@@ -1,6 +1,6 @@
 // The first mission in five steps. Each step is done by the state of the mission, not by a click, and the card can be closed for good.
 
-import { hasName, nameOf, shownAs, shownLabels } from "../book.js";
+import { hasName, nameOf, shownLabels } from "../book.js";
 import { denial } from "../command.js";
 import { $, data, h, show, text } from "../dom.js";
 import { cellAt } from "../map/readout.js";
@@ -16,10 +16,19 @@ const hasWeight = (v) => shownLabels(v).some((l) => weightsOrder.value(v, l.id) 
 const utility = (v) => slotOf(v, "utility");
 const isInForce = (v) => utility(v)?.state === "applied";
 
-/** The weight of the label that the vehicle was over at its last report. */
-function weightBelow(v) {
-  const cell = store.map ? cellAt(store.map, v.status.x_m, v.status.y_m) : null;
-  return cell?.label ? weightsOrder.value(v, shownAs(cell.label)) : 0;
+/** Metres from where the order was applied, from which a vehicle has come to a place because of it. */
+const WAY_M = 3;
+
+/** Whether the vehicle has gone to a label whose weight was sent, since the order was applied: it was over it at a report. */
+function hasArrived(v) {
+  const since = utility(v).changed_s;
+  const at = v.track.findLastIndex(([time]) => time <= since);
+  const from = v.track[Math.max(at, 0)];
+  const isWeighed = (id) => v.labels.some((l) => l.id === id && l.weight > 0);
+  return v.track.slice(at + 1).some(([, x, y]) => {
+    const cell = store.map && Math.hypot(x - from[1], y - from[2]) >= WAY_M ? cellAt(store.map, x, y) : null;
+    return Boolean(cell?.label) && isWeighed(cell.label);
+  });
 }
 
 /** What to expect after an order of weights. A vehicle without a plan holds because the weighed labels are done. */
@@ -50,7 +59,7 @@ const STEPS = [
   ["Weigh", "Move the slider of a label that you want to see more of to the right, then press Send weights below the list.",
     (v) => isInForce(v) && hasWeight(v)],
   ["Steer", steerInstruction,
-    (v) => isInForce(v) && v.status?.at_s > utility(v).changed_s && weightBelow(v) > 0],
+    (v) => isInForce(v) && hasArrived(v)],
   ["Picture", pictureInstruction,
     (v) => v.labels.some((l) => l.exemplar.images.some((image) => image.requested))],
 ];

@@ -10,6 +10,7 @@ import { ageOf, isStale, store } from "../store.js";
 import { cutPart, refreshCut } from "./label-cut.js";
 import { makeRow, refreshRow } from "./label-row.js";
 import { plannerPart, refreshPlanner } from "./planner.js";
+import { refreshTry, tryButton, tryPart } from "./try.js";
 import { TERMS, weightsDraft, weightsOrder } from "./weights.js";
 
 const weight = (label) => weightsOrder.value(store.vehicle, label.id);
@@ -52,7 +53,8 @@ export function startLabels() {
     update();
   });
   $("label-list").before(plannerPart, ...terms.map((t) => t.node), cutPart, empty);
-  $("send").append(draftNote, foot.node);
+  foot.node.firstElementChild.append(tryButton);
+  $("send").append(draftNote, tryPart, foot.node);
   weightsDraft.start();
   store.on("state select edit book highlight feed theme", update);
   store.on("tick", refreshOrders);
@@ -83,4 +85,5 @@ function refreshOrders() {
   show(draftNote, isOfOther);
   text(draftNote, isOfOther ? `Set by ${author} ${ago(ageOf(at_s))}, not sent yet.` : "");
   foot.update(vehicle, vehicle.labels.length === 0);
+  refreshTry(vehicle);
 }

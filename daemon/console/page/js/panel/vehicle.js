@@ -2,6 +2,7 @@
 
 import { $, h, keyed, row, show, text } from "../dom.js";
 import { ago, count, degrees, freeSpace, metres, missionTime, none, span } from "../format.js";
+import { nameOf } from "../book.js";
 import { inWorld } from "../map/frames.js";
 import { bearing } from "../map/measure.js";
 import { lengthOf, pathOf } from "../map/path.js";
@@ -33,6 +34,7 @@ export function startVehicle() {
     ["registration", "Camera frames", "What placed the last camera frame on the map, and how exactly against earlier parts of it; rings on the track mark places where a frame overlapped with an earlier track"],
     ["waypoint", "Waypoint", "Distance and direction from the reported position to the next place of the plan"],
     ["path", "Path", "The plan from the reported position through the waypoint to the last reported place; dashed on the map"],
+    ["arrival", "Target", "What the plan leads to first, and when the vehicle gets there at its speed"],
     ["cells", "Vehicle's map", "Explored cells and labels of the vehicle's own map, by its last report"],
     ["contact", "Next contact", "When the next frame of the vehicle is due"],
     ["disk", "Vehicle's disk", "The files that the vehicle cannot write, and its free space, by its last report"],
@@ -71,6 +73,9 @@ function update() {
   lines.registration.classList.toggle("warn", v.registration?.tie === "odometry");
   values.waypoint(s?.waypoint ? leg(s) : none);
   values.path(s?.waypoint ? plannedPath(s) : none);
+  const arrival = isStale(v) ? null : arrivalText(v);
+  values.arrival(arrival ?? "");
+  show(lines.arrival, arrival !== null);
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
   values.disk(disk(s?.disk));
@@ -125,6 +130,16 @@ function plannedPath(s) {
   const places = pathOf(s);
   const n = places.length - 1;
   return `${n} waypoint${n === 1 ? "" : "s"}, ${metres(lengthOf(places))}${s.path_continues ? ", continues" : ""}`;
+}
+
+/** When the vehicle gets to what its plan leads to; null once it should be there by its plan. */
+function arrivalText({ aims, status }) {
+  const first = aims?.first;
+  if (!first || status?.mode !== "survey") return null;
+  const leftS = first.arrival_s - store.nowS;
+  const what = first.label === null ? first.reason : `${first.reason === "expected" ? "expected " : ""}${nameOf(first.label)}`;
+  if (leftS > 0) return `at ${what} in about ${span(leftS)}`;
+  return first.along_m === 0 ? `at ${what} now` : null;
 }
 
 const makeSlot = () => h("li.slot", {}, h("span.name"), h("span.version"), h("span.state"), h("span.since"));

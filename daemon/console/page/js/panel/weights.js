@@ -14,14 +14,16 @@ const read = (vehicle, part) =>
 
 /** The slot is replaced as a whole, so each label's weight is sent. A merged label takes that of the label it is part of; a label of
  * a group of the tree takes a weight that is set for the group, and keeps its own as long as none is. */
-function post(vehicle, value) {
+export function utilityOf(vehicle, value) {
   const weights = {};
   for (const label of shownLabels(vehicle)) {
     const isSet = value(label.id) !== read(vehicle, label.id);
     for (const member of label.members) weights[member] = isSet || isMerged(member) ? value(label.id) : read(vehicle, member);
   }
-  return sendUtility(vehicle.id, { weights, ...Object.fromEntries(TERMS.map((term) => [term, value(term)])) });
+  return { weights, ...Object.fromEntries(TERMS.map((term) => [term, value(term)])) };
 }
+
+const post = (vehicle, value) => sendUtility(vehicle.id, utilityOf(vehicle, value));
 
 /** Whether the labels of a group have different weights, and none was set for the group. */
 export const isMixed = (vehicle, label) =>

@@ -42,6 +42,18 @@ pub(in crate::http) async fn utility(
     }
 }
 
+/// What the vehicle would do by an order that is not given.
+pub(in crate::http) async fn dry_run(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    JsonOrder(order): JsonOrder<UtilityOrder>,
+) -> Response {
+    match by_label(order.weights) {
+        Ok(weights) => shared.respond(SurfaceRequest::DryRun(id, weights, (order.exploration, order.curiosity))).await,
+        Err(unknown) => error(StatusCode::UNPROCESSABLE_ENTITY, unknown),
+    }
+}
+
 pub(in crate::http) async fn draft(
     State(shared): State<Shared>,
     Extension(by): Extension<Giver>,

@@ -1,8 +1,9 @@
 //! The operations that give orders.
 
-use super::{Operation, change, order, schema};
+use super::{Content, Operation, change, order, schema};
 use crate::http::handlers::orders as handlers;
 use axum::routing::post;
+use scenecast_surface::state::DryRun;
 use scenecast_surface::{
     AgainOrder, AreasOrder, BudgetOrder, ConstraintsOrder, DestinationOrder, ExemplarOrder, FenceOrder, LimitsOrder,
     RestoreOrder, Role, SettingsOrder, SurfaceRequest, TakeOverOrder, UtilityOrder,
@@ -18,6 +19,17 @@ pub(super) fn operations() -> Vec<Operation> {
             schema::<UtilityOrder>,
             || post(handlers::utility),
         ),
+        Operation {
+            role: Some(Role::Viewer),
+            success: (200, Content::Json(schema::<DryRun>)),
+            ..order(
+                "/api/v2/vehicles/{id}/dry-run",
+                "dry_run",
+                "Plans what the vehicle would do by these weights, with its own planner on the surface's map; nothing is sent",
+                schema::<UtilityOrder>,
+                || post(handlers::dry_run),
+            )
+        },
         order(
             "/api/v2/vehicles/{id}/exemplars",
             "request_exemplar",

@@ -106,7 +106,7 @@ enum CtlCommand {
         /// At most 1000 characters
         text: String,
     },
-    /// Print the last weights sent, or send others.
+    /// Print the last weights sent, try others, or send them.
     #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120")]
     Utility {
         #[command(subcommand)]
@@ -302,17 +302,23 @@ enum UtilityCommand {
     /// Send weights. Labels that are not listed get 0.
     #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2
          scenecast ctl utility set 'soft coral=0.5' --keep")]
-    Set {
-        /// Number or name of a label, and its weight, -1 to 1. A name stands also for the labels that are merged into it
-        #[arg(value_name = "LABEL=WEIGHT", value_parser = label_weight)]
-        weights: Vec<(String, f64)>,
-        /// Weight of unexplored cells, -1 to 1
-        #[arg(long, value_name = "WEIGHT", value_parser = weight, allow_hyphen_values = true)]
-        exploration: Option<f64>,
-        /// Keep the last weights of labels that are not listed
-        #[arg(long)]
-        keep: bool,
-    },
+    Set(UtilityArgs),
+    /// Print what the vehicle would do by these weights, and send nothing.
+    #[command(after_help = "Example: scenecast ctl utility try 3=0.9 --exploration 0.1")]
+    Try(UtilityArgs),
+}
+
+#[derive(Debug, Args)]
+struct UtilityArgs {
+    /// Number or name of a label, and its weight, -1 to 1. A name stands also for the labels that are merged into it
+    #[arg(value_name = "LABEL=WEIGHT", value_parser = label_weight)]
+    weights: Vec<(String, f64)>,
+    /// Weight of unexplored cells, -1 to 1
+    #[arg(long, value_name = "WEIGHT", value_parser = weight, allow_hyphen_values = true)]
+    exploration: Option<f64>,
+    /// Keep the last weights of labels that are not listed
+    #[arg(long)]
+    keep: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -386,8 +392,11 @@ impl CtlCommand {
             Self::Mark { change } => book::mark(session, change).await,
             Self::Note { text } => client::note(session, text).await,
             Self::Utility { change: None } => client::show_utility(session).await,
-            Self::Utility { change: Some(UtilityCommand::Set { weights, exploration, keep }) } => {
+            Self::Utility { change: Some(UtilityCommand::Set(UtilityArgs { weights, exploration, keep })) } => {
                 client::set_utility(session, &weights, exploration, keep).await
+            }
+            Self::Utility { change: Some(UtilityCommand::Try(UtilityArgs { weights, exploration, keep })) } => {
+                client::try_utility(session, &weights, exploration, keep).await
             }
             Self::Budget { change: None } => client::show_budget(session).await,
             Self::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares, background }) } => {
