@@ -45,7 +45,7 @@ impl DryRuns {
                 });
                 return;
             }
-            Err(answer) => answer,
+            Err(answer) => *answer,
         };
         // A browser that closed its connection needs no reply.
         let _ = reply.send(answer);
@@ -57,14 +57,14 @@ impl DryRuns {
         request: &SurfaceRequest,
         cell_m: f64,
         now: Instant,
-    ) -> Result<DryRunTask, Reply> {
-        let SurfaceRequest::DryRun(id, weights, terms) = request else { return Err(Reply::NotFound) };
+    ) -> Result<DryRunTask, Box<Reply>> {
+        let SurfaceRequest::DryRun(id, weights, terms) = request else { return Err(Box::new(Reply::NotFound)) };
         let vehicle = Address::vehicle(*id).filter(|&vehicle| surface.record(vehicle).is_some());
-        let vehicle = vehicle.ok_or(Reply::NotFound)?;
+        let vehicle = vehicle.ok_or(Box::new(Reply::NotFound))?;
         if Arc::strong_count(&self.one) > MOST {
-            return Err(Reply::Refused("too many dry runs at once: try again soon".to_owned()));
+            return Err(Box::new(Reply::Refused("too many dry runs at once: try again soon".to_owned())));
         }
         DryRunTask::new(surface, self.config.clone(), vehicle, (weights, *terms), cell_m, now)
-            .map_err(|refusal| Reply::Refused(refusal.to_string()))
+            .map_err(|refusal| Box::new(Reply::Refused(refusal.to_string())))
     }
 }

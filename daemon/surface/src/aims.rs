@@ -43,6 +43,8 @@ const FAVOURED: f64 = 0.15;
 const UNSEEN: f64 = 0.4;
 /// Cells along each side of a view that are looked at.
 const SAMPLES: i32 = 9;
+/// Cells along each side of a view that are lit at most, and rows of them.
+const MAX_CELLS: i32 = 256;
 const MAX_ROWS: usize = 256;
 /// The longest path that is looked at, metres: a plan is as long as its seven legs.
 const MAX_M: f64 = 2000.0;
@@ -132,7 +134,7 @@ impl Ground<'_> {
         let stretches = path.iter().skip_while(|s| s.to != at && s.reason != Some((reason, Some(label))));
         let mut cells: Vec<(i32, i32)> = Vec::new();
         for stretch in stretches.take_while(is_there) {
-            let seen = self.view(stretch.to, i32::MAX).filter(|&cell| self.map.get(cell) == label);
+            let seen = self.view(stretch.to, MAX_CELLS).filter(|&cell| self.map.get(cell) == label);
             cells.extend(seen.map(|cell| (cell.y, cell.x)));
         }
         cells.sort_unstable();

@@ -33,7 +33,7 @@ const bar = h("div.stack", { "aria-hidden": "true" });
 const free = h("span.free");
 const rows = Object.fromEntries(CLASSES.map((c, i) => [c, shareRow(c, i)]));
 const rest = h("output.value");
-const brings = Object.fromEntries(["map", "exemplar", "free"].map((c) => [c, h("p.brings")]));
+const brings = Object.fromEntries(["map", "exemplar", "free"].map((c) => [c, h("p.brings", { title: "By what waits at the vehicle, and the losses and heads of the link so far" })]));
 const shareBox = h("div.shares", { role: "group", "aria-label": "Minimum shares of the classes" },
   h("h3", {}, "Minimum shares, %"), bar, ...CLASSES.flatMap((c) => [rows[c].row, ...(brings[c] ? [brings[c]] : [])]),
   h("div.share-row", { title: "The rest, for whatever is waiting" }, h("span.swatch"), h("span", {}, "free"), h("span"), rest), brings.free);

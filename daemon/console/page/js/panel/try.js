@@ -19,7 +19,7 @@ const words = h("p");
 const rests = h("p.note");
 const legend = h("p.reasons", {}, ...Object.entries(REASONS).map(([reason, name]) => h("span", { data: { reason } }, name)));
 const card = h("div.dry-run", { hidden: true }, h("b", {}, "Dry run, not sent"), words, legend, rests, close);
-const errorLine = h("p.error", { role: "alert", hidden: true });
+const errorLine = h("p.note", { role: "alert", hidden: true, data: { state: "refused" } });
 
 export const tryButton = button;
 export const tryPart = h("div", {}, errorLine, card);
