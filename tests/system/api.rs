@@ -345,6 +345,14 @@ fn a_viewer_changes_nothing_by_any_documented_method() {
                 assert_eq!(ask(0, "POST", &path, "{}").0, 404);
                 continue;
             }
+            if path.ends_with("/dry-run") {
+                // It plans and sends nothing.
+                let (status, line) = ask(0, "POST", &path, "{\"weights\": {}, \"exploration\": 0.2}");
+                assert_eq!(status, 422, "{}", String::from_utf8_lossy(&line));
+                let state: Value = serde_json::from_slice(&ask(0, "GET", "/api/v2/state", "").1).unwrap();
+                assert_eq!(state["vehicles"][0]["directive"]["slots"], serde_json::json!([]), "{state}");
+                continue;
+            }
             for body in ["", "{}", "{\"action\": \"hold\"}", "{\"action\": \"take\"}"] {
                 let (status, line) = ask(0, &method.to_uppercase(), &path, body);
                 let line = String::from_utf8_lossy(&line).into_owned();
