@@ -17,6 +17,11 @@ pub fn vehicle_address(config: &Config) -> Result<Address, UserError> {
         .ok_or_else(|| UserError::Input(format!("vehicle.address = {number} is not allowed; allowed: 1 to 14")))
 }
 
+/// How far a camera frame reaches on the sea floor, metres across and along.
+pub fn frame_m(config: &Config) -> [f64; 2] {
+    [config.camera.width_px, config.camera.height_px].map(|px| f64::from(px) * config.camera.metres_per_pixel)
+}
+
 /// A modem that is described by its bit rate on air alone.
 pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
     ModemProfile {

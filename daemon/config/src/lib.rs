@@ -15,8 +15,8 @@ mod setting;
 
 pub use check::{full_frame_bytes, modem_port};
 pub use derived::{
-    authenticity, cell_m, joules_per_bit, map_origin, modem_profile, survey_depth_m, tuning_table, vehicle_address,
-    vehicle_names,
+    authenticity, cell_m, frame_m, joules_per_bit, map_origin, modem_profile, survey_depth_m, tuning_table,
+    vehicle_address, vehicle_names,
 };
 pub use load::load;
 pub use print::{changed_settings, print, reference, schema, shipped_files};

@@ -10,6 +10,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
 use scenecast_surface::state::{DryRun, FirstTarget, LegReason, PlanAims, PlanLeg, seconds};
 use scenecast_surface::{Ground, LabelBook, OrderRefusal, Place, Purpose, Surface};
+use scenecast_vehicle::planning::distance;
 use scenecast_vehicle::{Course, Steering, footprint, steering};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -83,7 +84,7 @@ impl DryRunTask {
         let (cells, own) = (surface.current_cells(vehicle) as f64, f64::from(status.explored_cells).max(1.0));
         let share = (100.0 * cells / own).min(100.0).round();
         let age_s = now.since(*reported).as_secs_f64();
-        let speed_m_s = record.track.speed_m_s().filter(|v| *v > 0.05).unwrap_or(config.survey.speed_m_s);
+        let speed_m_s = record.track.speed_m_s().unwrap_or(config.survey.speed_m_s);
         let from = carried_on(status, speed_m_s * age_s);
         let (area, assumed) = area(&config, &orders.fence, &map, (from, map_origin, cell_m));
         Ok(Self {
@@ -238,15 +239,10 @@ fn direction(east: f64, north: f64) -> &'static str {
     NAMES[eighths.rem_euclid(8) as usize]
 }
 
-fn distance(a: Place, b: Place) -> f64 {
-    (b.0 - a.0).hypot(b.1 - a.1)
-}
-
 /// Where a vehicle is `metres` along its plan from the place that it reported.
 fn carried_on(status: &VehicleStatus, mut metres: f64) -> Place {
     let mut at = status.position.xy();
-    let ahead = status.waypoint.into_iter().chain(status.path.points.iter().copied());
-    for to in ahead.map(MapPoint::xy) {
+    for to in status.ahead().map(MapPoint::xy) {
         let leg_m = distance(at, to);
         if leg_m > metres {
             let share = metres / leg_m;

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex};
 use tokio::sync::oneshot;
 
 /// Most dry runs at a time: one is planned, and the others wait.
-const MOST: usize = 4;
+const MAX_WAITING: usize = 4;
 
 /// Plans dry runs on another thread, one at a time.
 pub struct DryRuns {
@@ -61,7 +61,7 @@ impl DryRuns {
         let SurfaceRequest::DryRun(id, weights, terms) = request else { return Err(Box::new(Reply::NotFound)) };
         let vehicle = Address::vehicle(*id).filter(|&vehicle| surface.record(vehicle).is_some());
         let vehicle = vehicle.ok_or(Box::new(Reply::NotFound))?;
-        if Arc::strong_count(&self.one) > MOST {
+        if Arc::strong_count(&self.one) > MAX_WAITING {
             return Err(Box::new(Reply::Refused("too many dry runs at once: try again soon".to_owned())));
         }
         DryRunTask::new(surface, self.config.clone(), vehicle, (weights, *terms), cell_m, now)

@@ -19,6 +19,7 @@ pub struct Track {
 impl Track {
     /// The time over which the speed is measured: several legs, with the turns between them.
     const SPEED_S: f64 = 30.0;
+    const STANDS_M_S: f64 = 0.05;
     /// The most positions that are kept.
     pub(crate) const MAX_POINTS: usize = 500;
 
@@ -31,7 +32,7 @@ impl Track {
         self.points.iter().copied()
     }
 
-    /// The speed over the last [`Self::SPEED_S`] seconds, metres a second; `None` if the track is shorter.
+    /// The speed over the last [`Self::SPEED_S`] seconds, metres a second; `None` if the track is shorter, or the vehicle stands.
     pub fn speed_m_s(&self) -> Option<f64> {
         let &(end, ..) = self.points.back()?;
         let (mut metres, mut after) = (0.0, *self.points.back()?);
@@ -39,7 +40,7 @@ impl Track {
             metres += (after.1 - point.1).hypot(after.2 - point.2);
             let seconds = end.since(point.0).as_secs_f64();
             if seconds >= Self::SPEED_S {
-                return Some(metres / seconds);
+                return Some(metres / seconds).filter(|m_s| *m_s > Self::STANDS_M_S);
             }
             after = point;
         }

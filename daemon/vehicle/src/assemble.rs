@@ -3,7 +3,7 @@
 use crate::cells::descriptors;
 use crate::{Durable, FailsafePolicy, Footprint, LastPlace, MapSelection, Navigator, Steering, Vehicle};
 use scenecast_config::{
-    Config, Debounce, LabelSource, LayerName, MapCells, NavigationSource, cell_m, map_origin, vehicle_address,
+    Config, Debounce, LabelSource, LayerName, MapCells, NavigationSource, cell_m, frame_m, map_origin, vehicle_address,
 };
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
@@ -83,12 +83,8 @@ pub fn link_config(
 
 /// The extent of a camera frame on the sea floor, as configured.
 pub fn footprint(config: &Config) -> Footprint {
-    let mpp = config.camera.metres_per_pixel;
-    Footprint {
-        across: f64::from(config.camera.width_px) * mpp,
-        along: f64::from(config.camera.height_px) * mpp,
-        leg_overlap: config.survey.leg_overlap_percent / 100.0,
-    }
+    let [across, along] = frame_m(config);
+    Footprint { across, along, leg_overlap: config.survey.leg_overlap_percent / 100.0 }
 }
 
 /// Labels of another program do not flicker as those of a sampler do: unless the configuration says otherwise, none is held

@@ -231,6 +231,11 @@ impl VehicleStatus {
     /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
 
+    /// The places of its plan, the nearest first.
+    pub fn ahead(&self) -> impl Iterator<Item = MapPoint> + '_ {
+        self.waypoint.into_iter().chain(self.path.points.iter().copied())
+    }
+
     /// Whether the vehicle holds because it has reached the end of its survey's plan.
     pub fn has_arrived(&self) -> bool {
         (self.mode, self.reason) == (VehicleMode::Hold, ModeReason::Survey)

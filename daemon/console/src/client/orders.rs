@@ -6,7 +6,7 @@ use super::session::{Session, follow};
 use super::text::{self, span};
 use scenecast_core::UserError;
 use scenecast_files::{AreaShape, CoordinateFrame, read_areas};
-use scenecast_surface::state::{CommandState, DryRun, MissionState, PrincipalInfo, VehicleState};
+use scenecast_surface::state::{CommandState, DryRun, MissionState, PrincipalInfo};
 use scenecast_surface::{
     AreaOrder, AreasOrder, BudgetOrder, CommandOrder, DestinationOrder, SharesOrder, UtilityOrder,
 };
@@ -52,10 +52,8 @@ pub async fn set_utility(
     exploration: Option<f64>,
     keep: bool,
 ) -> Result<(), UserError> {
-    let state = session.state().await?;
-    let vehicle = session.choose(&state)?;
-    let order = utility_order(vehicle, weights, exploration, keep)?;
-    let accepted = session.client.post(&format!("/api/v2/vehicles/{}/utility", vehicle.id), &order).await?;
+    let (id, order) = utility_order(session, weights, exploration, keep).await?;
+    let accepted = session.client.post(&format!("/api/v2/vehicles/{id}/utility"), &order).await?;
     follow(session, accepted).await
 }
 
@@ -66,19 +64,20 @@ pub async fn try_utility(
     exploration: Option<f64>,
     keep: bool,
 ) -> Result<(), UserError> {
-    let state = session.state().await?;
-    let vehicle = session.choose(&state)?;
-    let order = utility_order(vehicle, weights, exploration, keep)?;
-    let run: DryRun = session.client.post(&format!("/api/v2/vehicles/{}/dry-run", vehicle.id), &order).await?;
+    let (id, order) = utility_order(session, weights, exploration, keep).await?;
+    let run: DryRun = session.client.post(&format!("/api/v2/vehicles/{id}/dry-run"), &order).await?;
     session.print(&run, || format!("{}\n{}\n", run.text, run.rests_on))
 }
 
-fn utility_order(
-    vehicle: &VehicleState,
+/// The number of the vehicle, and the weights for it.
+async fn utility_order(
+    session: &Session,
     weights: &[(String, f64)],
     exploration: Option<f64>,
     keep: bool,
-) -> Result<UtilityOrder, UserError> {
+) -> Result<(u8, UtilityOrder), UserError> {
+    let state = session.state().await?;
+    let vehicle = session.choose(&state)?;
     let mut given: BTreeMap<u8, f64> = BTreeMap::new();
     for (text, weight) in weights {
         for label in names::labels(&vehicle.label_book, text)? {
@@ -95,7 +94,7 @@ fn utility_order(
         order.curiosity = vehicle.orders.utility.curiosity;
     }
     order.weights.extend(given.into_iter().map(|(label, w)| (label.to_string(), w)));
-    Ok(order)
+    Ok((vehicle.id, order))
 }
 
 /// Prints the budgets, the shares and the background streams.

@@ -189,7 +189,7 @@ impl Dive {
         if rows.is_empty() {
             return;
         }
-        let path = match (vehicle.is_played_back(), vehicle.own.track.len() > 1) {
+        let path = match (vehicle.is_played_back(), vehicle.has_own_path()) {
             (true, _) => "Its path was that of the recording that was played back: no order could change it.",
             (_, true) => "By its own record.",
             (_, false) => {

@@ -167,7 +167,7 @@ fn track(svg: &mut String, frame: &Frame, vehicle: &DiveVehicle, texts: &mut Tex
     let path = vehicle.path();
     let began = path.iter().zip(path.iter().skip(1)).filter(|(a, b)| vehicle.began_between(a, b));
     let restarts = began.map(|(_, after)| (Some(after), "restart"));
-    let ends = if vehicle.own.track.len() > 1 { ["start", "end"] } else { ["first report", "last report"] };
+    let ends = if vehicle.has_own_path() { ["start", "end"] } else { ["first report", "last report"] };
     for (place, name) in [(path.first(), ends[0]), (path.last(), ends[1])].into_iter().chain(restarts) {
         place.into_iter().for_each(|place| point(svg, frame, (place.east_m, place.north_m), (name, -5.0), texts));
     }

@@ -9,9 +9,14 @@ const SPAN_S: f64 = 10.0;
 const LEAST_M_S: f64 = 0.05;
 
 impl DiveVehicle {
+    /// Whether its own record has its path.
+    pub(super) fn has_own_path(&self) -> bool {
+        self.own.track.len() > 1
+    }
+
     /// The places of its own record, or else those that it has reported.
     pub(super) fn path(&self) -> &[TrackPoint] {
-        if self.own.track.len() > 1 { &self.own.track } else { &self.track }
+        if self.has_own_path() { &self.own.track } else { &self.track }
     }
 
     /// The parts of its path between jumps: where its program began again with another place, or where it would have had to be faster
@@ -34,7 +39,7 @@ impl DiveVehicle {
     /// Whether its program began again between two of its places.
     pub(super) fn began_between(&self, a: &TrackPoint, b: &TrackPoint) -> bool {
         let is_between = |began_s: &f64| a.at_s < *began_s && b.at_s >= *began_s;
-        match self.own.track.len() > 1 {
+        match self.has_own_path() {
             true => self.own.runs_s.iter().skip(1).any(|(began_s, _)| is_between(began_s)),
             false => self.restarts_s.iter().any(is_between),
         }

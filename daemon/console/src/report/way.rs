@@ -65,7 +65,7 @@ pub(super) fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) ->
         || "the mission has no latitude and longitude".to_owned(),
         |origin| format!("the origin is at {}", words::origin(origin)),
     );
-    let has_own = vehicle.own.track.len() > 1;
+    let has_own = vehicle.has_own_path();
     let begin = vehicle.path().first().map_or_else(String::new, |first| {
         format!(
             " {} {} and {} of the origin{}",

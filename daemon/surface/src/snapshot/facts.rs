@@ -58,8 +58,7 @@ impl MissionFacts {
             speed,
             ended_s: None,
             cell_m: config::cell_m(config),
-            reach_m: f64::from(config.camera.width_px.min(config.camera.height_px)) * config.camera.metres_per_pixel
-                / 2.0,
+            reach_m: config::frame_m(config).into_iter().fold(f64::INFINITY, f64::min) / 2.0,
             survey_m_s: config.survey.speed_m_s,
             idle_s: config.link.max_idle_s,
             first_interval_s: config.link.max_idle_s + config.link.max_turn_s,

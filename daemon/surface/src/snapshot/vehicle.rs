@@ -225,12 +225,11 @@ fn aims(
         VehicleMode::Return => Purpose::Return,
         _ => Purpose::Survey(status.intent),
     };
-    let waypoints = status.waypoint.into_iter().chain(status.path.points.iter().copied());
-    let legs: Vec<_> = waypoints.map(|to| (to.xy(), purpose)).collect();
+    let legs: Vec<_> = status.ahead().map(|to| (to.xy(), purpose)).collect();
     let cell_m = view.cell_m().unwrap_or(facts.cell_m);
     let weight = |label| record.weight(label);
     let ground = Ground { map, cell_m, weight: &weight, reach_m: facts.reach_m };
-    let speed_m_s = record.track.speed_m_s().filter(|v| *v > 0.05).unwrap_or(facts.survey_m_s);
+    let speed_m_s = record.track.speed_m_s().unwrap_or(facts.survey_m_s);
     (!legs.is_empty()).then(|| ground.aims(status.position.xy(), &legs, seconds(*at), speed_m_s))
 }
 
