@@ -47,8 +47,12 @@ impl Surface {
     }
 
     pub(super) fn log_command(&mut self, change: &CommandChange) {
+        let from = |text: &str| match change.from.as_ref().filter(|from| **from != change.by) {
+            Some(from) => format!("{text} from {from}"),
+            None => text.to_owned(),
+        };
         let text = match (change.kind, &change.to) {
-            (CommandChangeKind::Taken, _) => "takes command".to_owned(),
+            (CommandChangeKind::Taken, _) => from("takes command"),
             (CommandChangeKind::Moved, _) => "moves command to another client".to_owned(),
             (CommandChangeKind::HandedOver, Some(to)) => format!("hands command over to {to}"),
             (CommandChangeKind::HandedOver, None) => "hands command over".to_owned(),

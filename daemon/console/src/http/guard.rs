@@ -76,8 +76,8 @@ fn is_viewer(path: &str, origin: &str) -> bool {
 pub(super) struct Need {
     pub(super) role: Role,
     pub(super) id: &'static str,
-    /// Whether it is an order, so that the log has who wanted to give it.
-    pub(super) is_order: bool,
+    /// Whether it changes something, so that the log has who wanted it.
+    pub(super) is_logged: bool,
 }
 
 /// Refuses principals below a role, before the body of the request is read.
@@ -91,7 +91,7 @@ pub(super) async fn require_role(
         Some(Extension(by)) if by.role() >= need.role => next.run(request).await,
         Some(Extension(by)) => {
             let line = format!("this needs the role {}; the role of {} is {}", need.role, by.name(), by.role());
-            if need.is_order {
+            if need.is_logged {
                 let mut parts = request.uri().path().split('/').skip_while(|part| *part != "vehicles");
                 let vehicle = parts.nth(1).and_then(|id| id.parse().ok());
                 let what = format!("{}: not sent: {line}", need.id.replace('_', " "));

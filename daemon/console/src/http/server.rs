@@ -95,8 +95,7 @@ fn router(shared: Shared) -> Router {
             o.path,
             match o.role {
                 Some(role) => {
-                    let need =
-                        guard::Need { role, id: o.id, is_order: o.success.0 == axum::http::StatusCode::ACCEPTED };
+                    let need = guard::Need { role, id: o.id, is_logged: o.method != axum::http::Method::GET };
                     let state = (need, shared.clone());
                     route.route_layer(axum::middleware::from_fn_with_state(state, guard::require_role))
                 }

@@ -43,10 +43,6 @@ pub(super) fn doubts(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -
     if dive.is_scaled() {
         sentences.push("Limits, and times inside what the programs said, are those of the mission.".to_owned());
     }
-    // The local user has every role.
-    if vehicle.given.values().any(|order| !["", "local"].contains(&order.principal.as_str())) {
-        sentences.push("What people asked for whose role does not allow it is not recorded.".to_owned());
-    }
     if extent::sea_floor(dive, state, vehicle).is_some() {
         sentences.push(
             "The depth of the water is the depth of the vehicle and its height above the sea floor; where nothing measured that height, it is \

@@ -4,7 +4,7 @@ use super::Escaped;
 use super::chart::{self, Series};
 use super::dive::{Dive, DiveVehicle};
 use super::round_trip::by_round_trip;
-use super::words::counted;
+use super::words::{self, counted};
 use super::{frames, gaps};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::Link;
@@ -134,7 +134,7 @@ impl Dive {
         let own_title = if has_own { "<th>sent on board, copies not counted</th>" } else { "" };
         let _ = writeln!(
             page,
-            "<table><thead><tr><th>direction</th><th>class</th><th>bytes</th>{own_title}<th>share</th><th>what they brought</th></tr></thead>"
+            "<table><thead><tr><th>direction</th><th>kind</th><th>bytes</th>{own_title}<th>share</th><th>what they brought</th></tr></thead>"
         );
         for (name, direction) in directions {
             let mut classes: Vec<_> = direction.bytes_by_class.iter().filter(|(_, bytes)| **bytes > 0).collect();
@@ -146,7 +146,7 @@ impl Dive {
                 let _ = writeln!(
                     page,
                     "<tr><td>{name}</td><td>{}</td><td class=\"n\">{bytes}</td>{}<td class=\"n\">{:.0} %</td><td>{}</td></tr>",
-                    Escaped(class),
+                    Escaped(words::traffic(class)),
                     if has_own { format!("<td class=\"n\">{sent}</td>") } else { String::new() },
                     *bytes as f64 / all.max(1) as f64 * 100.0,
                     self.brought(class, *bytes)

@@ -147,6 +147,16 @@ pub(super) fn area(m2: f64) -> String {
     }
 }
 
+/// A class of traffic: what its bytes carry.
+pub(super) fn traffic(class: &str) -> &str {
+    match class {
+        "directive" => "orders",
+        "exemplar" => "images",
+        "fix" => "position fixes",
+        other => other,
+    }
+}
+
 /// The content of an order.
 pub(super) fn content(book: &LabelBook, order: &Order) -> String {
     let Ok(Value::Object(members)) = serde_json::from_str(&order.content) else { return order.content.clone() };
@@ -179,7 +189,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             Some(format!("images of {}", labels.iter().filter_map(title).collect::<Vec<_>>().join(", ")))
         }
         ("shares", Value::Object(shares)) => {
-            let share = |(class, percent): (&String, &Value)| format!("{class} {percent} %");
+            let share = |(class, percent): (&String, &Value)| format!("{} {percent} %", traffic(class));
             Some(format!("shares: {}", shares.iter().map(share).collect::<Vec<_>>().join(", ")))
         }
         ("place" | "return_point", Value::Array(at)) => Some(format!(
@@ -361,6 +371,8 @@ mod tests {
         assert_eq!(told(areas), "1 area: weight 0.5 (3 corners in m east and north: (0, 0) (2, 0) (2, 2))");
         let limits = r#"{"depth_m": [5.0, 30.5], "on_silence": "return", "silence_s": 300.0, "time_s": null}"#;
         assert_eq!(told(limits), "depth 5 to 30.5 m; on silence return; silence 300 s");
+        let budget = r#"{"bits_per_s": 900, "shares": {"directive": 10, "exemplar": 15, "fix": 5}}"#;
+        assert!(told(budget).ends_with("shares: orders 10 %, images 15 %, position fixes 5 %"), "{}", told(budget));
         let stops = |content: &str| Order { slot: "constraints".into(), ..order(content) };
         let told = |text: &str| content(&LabelBook::default(), &stops(text));
         assert_eq!(told(r#"{"hold": true, "abort": false}"#), "hold");

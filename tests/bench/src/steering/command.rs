@@ -13,7 +13,9 @@ use scenecast_tools::commands::SeedArguments;
 /// model finds it once it has been shown the whole sea floor. `gain` is the time that the camera spends over that area in
 /// the next ten minutes, divided by the same time without the order; `class gain` is the same over the true class of most
 /// of that area, of which the label may be a part only. `stay` is the longest time that the vehicle stays within 2 m
-/// without a report that it holds.
+/// without a report that it holds. `turn` is the time from the vehicle's receipt of the order until its heading is within 30
+/// degrees of the way to its nearest cell of the label that it has not looked at since (0 over such a cell; at most 20 s are
+/// waited for), and `purpose` that of the vehicle's plan after 20 s.
 ///
 /// The exit code is 1 if the median gain is below 2 or a stay lasts a minute. The same seed gives the same figures.
 #[derive(Debug, Args)]
@@ -36,7 +38,7 @@ impl SteeringBench {
         let config = scenecast_config::load(None, &sets)?;
         if !self.json {
             println!(
-                "seed label  share  seen m²  unseen m²   with s  without s   gain  class            class gain  stay s"
+                "seed label  share  seen m²  unseen m²   with s  without s   gain  class            class gain  stay s  turn s  purpose"
             );
         }
         let mut progress = Progress::new("seeds");
@@ -56,7 +58,14 @@ impl SteeringBench {
         if self.json {
             println!("{}", serde_json::to_string_pretty(figures).map_err(UserError::failed)?);
         } else {
-            println!("median gain {:.2}; longest stay {} s", figures.median_gain, figures.longest_stay_s);
+            println!(
+                "median gain {:.2}, class gain {:.2}; longest stay {} s; turned to the label in {} of {}",
+                figures.median_gain,
+                figures.median_class_gain,
+                figures.longest_stay_s,
+                figures.turned(),
+                figures.pairs.len()
+            );
         }
         let missed = figures.missed();
         if missed.is_empty() { Ok(()) } else { Err(UserError::Failed(missed.join("; "))) }
@@ -65,7 +74,7 @@ impl SteeringBench {
 
 fn print(p: &SteeringPair) {
     println!(
-        "{:>4} {:>5} {:>5.1}% {:>8.1} {:>10.1} {:>8.1} {:>10.1} {:>6.2}  {:<16} {:>10.2} {:>7}",
+        "{:>4} {:>5} {:>5.1}% {:>8.1} {:>10.1} {:>8.1} {:>10.1} {:>6.2}  {:<16} {:>10.2} {:>7} {:>7}  {}",
         p.seed,
         p.label,
         100.0 * p.share,
@@ -76,6 +85,8 @@ fn print(p: &SteeringPair) {
         p.gain,
         p.class,
         p.class_gain,
-        p.longest_stay_s
+        p.longest_stay_s,
+        p.turned_s.map_or("-".to_owned(), |seconds| seconds.to_string()),
+        p.purpose
     );
 }

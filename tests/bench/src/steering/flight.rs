@@ -1,10 +1,11 @@
 //! One run of the bench: the vehicle's places and the true classes below its camera.
 
+use super::turn::Turn;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_protocol::map::{Cell, LabelGrid, Rect};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::VehicleMode;
+use scenecast_protocol::wire::{Intent, VehicleMode};
 use scenecast_rehearsal::{Mission, MissionOptions, World, true_classes};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -31,6 +32,9 @@ pub(super) struct Flight {
     classes: LabelGrid,
     watched: Option<Watched>,
     watched_s: [f64; 2],
+    turn: Turn,
+    /// The purpose of the vehicle's plan in the last second in which its turn was watched.
+    purpose: Option<Intent>,
     /// Places of each second since the vehicle last left a circle or held.
     stay: VecDeque<(f64, f64)>,
     longest_stay_s: u32,
@@ -46,7 +50,16 @@ impl Flight {
         let count = |high: f64, first: i32| (cell(high) - first + 1).max(1) as u32;
         let area = Rect { x, y, width: count(around.east, x), height: count(around.north, y) };
         let classes = true_classes(mission.world(), area, cell_m);
-        Ok(Self { mission, classes, watched: None, watched_s: [0.0; 2], stay: VecDeque::new(), longest_stay_s: 0 })
+        Ok(Self {
+            mission,
+            classes,
+            watched: None,
+            watched_s: [0.0; 2],
+            turn: Turn::default(),
+            purpose: None,
+            stay: VecDeque::new(),
+            longest_stay_s: 0,
+        })
     }
 
     /// Adds up the time over this floor from now on.
@@ -57,6 +70,11 @@ impl Flight {
     /// Seconds over the watched label and over the watched class.
     pub(super) fn watched_s(&self) -> [f64; 2] {
         self.watched_s
+    }
+
+    /// Seconds from the order until the vehicle headed for the label, and the purpose of its plan after 20 s.
+    pub(super) fn turned(&self) -> (Option<u32>, Option<Intent>) {
+        (self.turn.turned_s(), self.purpose)
     }
 
     pub(super) fn longest_stay_s(&self) -> u32 {
@@ -92,6 +110,7 @@ impl Flight {
             let of_class = self.share_in_view(|cell| self.class_at(cell) == Some(*class));
             self.watched_s = [self.watched_s[0] + of_label, self.watched_s[1] + of_class];
         }
+        self.note_turn();
         let at = (self.mission.motion().x_m, self.mission.motion().y_m);
         self.stay.push_back(at);
         if self.is_holding() {
@@ -102,6 +121,20 @@ impl Flight {
             self.stay.pop_front();
         }
         self.longest_stay_s = self.longest_stay_s.max(self.stay.len().saturating_sub(1) as u32);
+    }
+
+    /// Watches how the vehicle turns once it has the order.
+    fn note_turn(&mut self) {
+        let (vehicle, Some(Watched { label, .. })) = (self.mission.vehicle(), &self.watched) else { return };
+        if vehicle.utility().is_none() || self.turn.is_over() {
+            return;
+        }
+        let ((x, y), cell_m, camera) =
+            (vehicle.navigator().position().xy(), self.mission.cell_m(), &self.mission.config().camera);
+        let reach = f64::from(camera.width_px.min(camera.height_px)) * camera.metres_per_pixel / 2.0 / cell_m;
+        let heading_rad = self.mission.motion().heading_rad;
+        self.turn.note((vehicle.map(), *label), (x / cell_m, y / cell_m), heading_rad, reach);
+        self.purpose = vehicle.status(self.mission.now()).intent;
     }
 
     /// Whether the last report at the surface says that the vehicle does not survey.

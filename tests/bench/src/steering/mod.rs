@@ -4,6 +4,7 @@ mod command;
 mod favourite;
 mod flight;
 mod reference;
+mod turn;
 
 pub(crate) use command::SteeringBench;
 
@@ -11,6 +12,8 @@ use favourite::Favourite;
 use flight::{Flight, Watched};
 use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_protocol::wire::Intent;
+use scenecast_worlds::scoring::median;
 use serde::Serialize;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
@@ -44,6 +47,11 @@ pub struct SteeringPair {
     /// The true class of most of that area, and the same gain over the floor of this class.
     pub class: String,
     pub class_gain: f64,
+    /// Seconds from the vehicle's receipt of the order until it headed for its nearest cell of the label that it had not
+    /// looked at since; `None` if it took more than 20 s.
+    pub turned_s: Option<u32>,
+    /// The purpose of the vehicle's plan at the end of that time.
+    pub purpose: String,
     /// The longest time that the vehicle stayed within 2 m without a report that it holds, in both runs, seconds.
     pub longest_stay_s: u32,
 }
@@ -52,18 +60,22 @@ pub struct SteeringPair {
 pub struct SteeringFigures {
     pub pairs: Vec<SteeringPair>,
     pub median_gain: f64,
+    pub median_class_gain: f64,
     pub longest_stay_s: u32,
 }
 
 impl SteeringFigures {
     fn new(mut pairs: Vec<SteeringPair>) -> Self {
         pairs.sort_by_key(|pair| pair.seed);
-        let mut gains: Vec<f64> = pairs.iter().map(|pair| pair.gain).collect();
-        gains.sort_by(f64::total_cmp);
-        let at = |i: usize| gains.get(i).copied().unwrap_or_default();
-        let median_gain = (at(gains.len().saturating_sub(1) / 2) + at(gains.len() / 2)) / 2.0;
+        let median_of = |gain: fn(&SteeringPair) -> f64| median(&pairs.iter().map(gain).collect::<Vec<f64>>());
+        let (median_gain, median_class_gain) = (median_of(|pair| pair.gain), median_of(|pair| pair.class_gain));
         let longest_stay_s = pairs.iter().map(|pair| pair.longest_stay_s).max().unwrap_or_default();
-        Self { pairs, median_gain, longest_stay_s }
+        Self { pairs, median_gain, median_class_gain, longest_stay_s }
+    }
+
+    /// Pairs whose vehicle headed for the label in time.
+    pub fn turned(&self) -> usize {
+        self.pairs.iter().filter(|pair| pair.turned_s.is_some()).count()
     }
 
     /// The limits that were not kept, a line each.
@@ -134,6 +146,7 @@ fn pair(config: &Config, seed: u64) -> Result<SteeringPair, UserError> {
     without.watch(watched());
     without.fly_until(END_S)?;
     let ([with_s, class_s], [without_s, other_class_s]) = (with.watched_s(), without.watched_s());
+    let (turned_s, purpose) = with.turned();
     let round = |value: f64| (value * 10.0).round() / 10.0;
     Ok(SteeringPair {
         seed,
@@ -146,8 +159,21 @@ fn pair(config: &Config, seed: u64) -> Result<SteeringPair, UserError> {
         gain: with_s / without_s.max(1.0),
         class: with.class_name(class),
         class_gain: class_s / other_class_s.max(1.0),
+        turned_s,
+        purpose: purpose.map_or("none", purpose_name).to_owned(),
         longest_stay_s: with.longest_stay_s().max(without.longest_stay_s()),
     })
+}
+
+fn purpose_name(purpose: Intent) -> &'static str {
+    match purpose {
+        Intent::Unseen => "unseen",
+        Intent::Curiosity => "curiosity",
+        Intent::Label(_) => "label",
+        Intent::LabelAgain(_) => "label again",
+        Intent::Destination => "destination",
+        Intent::Area(_) => "area",
+    }
 }
 
 #[cfg(test)]
@@ -166,6 +192,8 @@ mod tests {
             with_s: gain,
             without_s: 1.0,
             gain,
+            turned_s: None,
+            purpose: "label".to_owned(),
             longest_stay_s,
         }
     }
