@@ -11,13 +11,15 @@ use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
 use scenecast_surface::state::{DryRun, FirstTarget, LegReason, PlanAims, PlanLeg, seconds};
 use scenecast_surface::{Ground, LabelBook, OrderRefusal, Place, Purpose, Surface};
 use scenecast_vehicle::planning::distance;
-use scenecast_vehicle::{Course, Steering, footprint, steering};
+use scenecast_vehicle::{Alternative, Course, Steering, footprint, steering};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The length of the path that is planned, metres, and its most legs.
 const MAX_M: f64 = 120.0;
 const MAX_LEGS: usize = 80;
+/// A path that is longer than the straight line by this factor, or than another path, is a detour.
+const DETOUR: f64 = 1.5;
 
 /// A dry run with everything that it needs, so that it may run on another thread.
 pub struct DryRunTask {
@@ -111,7 +113,7 @@ impl DryRunTask {
     /// Plans the path.
     pub fn run(self) -> DryRun {
         let mut steering = self.steering();
-        let legs = self.fly(&mut steering);
+        let (legs, other) = self.fly(&mut steering);
         let weight = |label: u8| self.utility[1].weight(label);
         let reach_m = footprint(&self.config).reach();
         let ground = Ground { map: &self.map, cell_m: self.cell_m, weight: &weight, reach_m };
@@ -123,7 +125,7 @@ impl DryRunTask {
             from: self.from,
             metres: (metres * 10.0).round() / 10.0,
             at_s: now_s,
-            text: self.text(&aims, now_s),
+            text: self.text(&aims, other, now_s),
             rests_on: self.rests_on,
             aims,
         }
@@ -161,20 +163,23 @@ impl DryRunTask {
         }
     }
 
-    /// The waypoints on a map that stays as it is, in the map frame.
-    fn fly(&self, steering: &mut Steering) -> Vec<(Place, Purpose)> {
-        let (mut at, mut metres, mut legs) = (self.to_world(self.from), 0.0, Vec::new());
+    /// The waypoints on a map that stays as it is, in the map frame, and what the first plan may leave aside.
+    fn fly(&self, steering: &mut Steering) -> (Vec<(Place, Purpose)>, Option<Alternative>) {
+        let (mut at, mut metres, mut legs, mut other) = (self.to_world(self.from), 0.0, Vec::new(), None);
         while metres < MAX_M && legs.len() < MAX_LEGS {
             let detour = steering.next_detour(at, f64::INFINITY);
             let next = || steering.next(at, (&self.map, 1), Some(&self.utility[1]), f64::INFINITY);
             let Course::Go(to) = detour.unwrap_or_else(next) else { break };
+            if detour.is_none() && legs.is_empty() {
+                other = steering.alternative(at, &self.map, &self.utility[1]);
+            }
             let purpose = Purpose::Survey(steering.intent());
             metres += distance(at, to);
             self.look(steering, [self.to_map(at), self.to_map(to)].into_iter());
             legs.push((self.to_map(to), purpose));
             at = to;
         }
-        legs
+        (legs, other)
     }
 
     fn to_world(&self, (x, y): Place) -> Place {
@@ -185,7 +190,7 @@ impl DryRunTask {
         (x - self.map_origin.0, y - self.map_origin.1)
     }
 
-    fn text(&self, aims: &PlanAims, now_s: f64) -> String {
+    fn text(&self, aims: &PlanAims, other: Option<Alternative>, now_s: f64) -> String {
         let held = match self.mode {
             VehicleMode::Survey => "",
             _ => " It does not survey now, so it would begin once it is ordered to.",
@@ -204,14 +209,43 @@ impl DryRunTask {
         let is_other = |leg: &&PlanLeg| (leg.reason, leg.label) != (first.reason, first.label);
         let then = at.and_then(|at| aims.legs[at..].iter().find(is_other));
         let then = then.map_or_else(String::new, |leg| format!(", then look at {}", name(leg.reason, leg.label)));
-        format!("With these weights the vehicle would {goes}{then}.{held}")
+        let other = other.map_or_else(String::new, |other| self.left_aside(&other, first));
+        format!("With these weights the vehicle would {goes}{then}.{other}{held}")
     }
 
     /// Distance, direction and time to a target.
     fn way(&self, first: &FirstTarget, now_s: f64) -> String {
-        let (east, north) = (first.at.0 - self.from.0, first.at.1 - self.from.1);
-        let way = direction(east, north);
-        format!("{:.0} m to the {way}, in about {:.0} s", east.hypot(north), first.arrival_s - now_s)
+        let metres = distance(self.from, first.at);
+        let by = match first.along_m > DETOUR * metres {
+            true => format!(", by a path of {:.0} m over other floor", first.along_m),
+            false => String::new(),
+        };
+        format!("{}, in about {:.0} s{by}", self.where_is(first.at), first.arrival_s - now_s)
+    }
+
+    /// Distance and direction to a place.
+    fn where_is(&self, place: Place) -> String {
+        let direction = direction(place.0 - self.from.0, place.1 - self.from.1);
+        format!("{:.0} m to the {direction}", distance(self.from, place))
+    }
+
+    /// Why the vehicle does not go to the nearest known floor of a favoured label first; empty if it does.
+    fn left_aside(&self, other: &Alternative, first: &FirstTarget) -> String {
+        if first.reason == LegReason::Label && first.along_m <= DETOUR * other.metres {
+            return String::new();
+        }
+        let mut favoured = self.utility[1].weights.iter().filter(|(_, weight)| **weight > 0);
+        let floor = match (favoured.next(), favoured.next()) {
+            (Some((&label, _)), None) => named(LegReason::Label, Some(label), &self.labels),
+            _ => "a favoured label".to_owned(),
+        };
+        format!(
+            " Known floor of {floor} lies {}: a metre of the way there is expected to show {:.2} m², each counted by its weight, a metre of this \
+             path {:.2} m².",
+            self.where_is(self.to_map(other.at)),
+            other.gain_a_metre,
+            other.of_plan
+        )
     }
 }
 
@@ -344,6 +378,19 @@ mod tests {
         task.orders.destination = Some(DecimetrePoint::new(500, 350));
         let leg = task.run().aims.legs.swap_remove(0);
         assert_eq!((leg.reason, leg.to), (LegReason::Destination, (50.0, 35.0)));
+    }
+
+    #[test]
+    fn a_path_over_other_floor_says_what_both_ways_gain() {
+        let mut unseen_around = task(&[(4, 20)]);
+        unseen_around.utility[1].exploration = 100;
+        unseen_around.map = unseen_around.map.iter().filter(|(cell, _)| cell.x < 130 && cell.y < 90).collect();
+        unseen_around.from = (30.0, 20.0);
+        let text = unseen_around.run().text;
+        let gains: Vec<f64> = text.split(" m²").filter_map(|part| part.rsplit_once(' ')?.1.parse().ok()).collect();
+        assert!(text.contains("Known floor of label 4 (coral) lies") && gains.len() == 2, "{text}");
+        assert!(gains[0] < gains[1], "{text}");
+        assert!(!task(&[(4, 90)]).run().text.contains("Known floor"), "it goes there first");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What a planned path is for, by the operator's map: the reason of each leg, and the cells that it leads to.
 
-use crate::state::{FirstTarget, LegReason, PlanAims, PlanLeg};
+use crate::state::{FavouredTime, FirstTarget, LegReason, PlanAims, PlanLeg};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::wire::Intent;
 use std::collections::BTreeMap;
@@ -49,7 +49,34 @@ const MAX_ROWS: usize = 256;
 /// The longest path that is looked at, metres: a plan is as long as its seven legs.
 const MAX_M: f64 = 2000.0;
 
+/// The least time over which the part of it over favoured floor is told, seconds.
+const MIN_SPAN_S: f64 = 30.0;
+
 impl Ground<'_> {
+    /// The part of the time of a track, after `since_s` and before, that the vehicle was over floor of a favoured label. `track` has
+    /// seconds, metres east and metres north.
+    pub fn favoured_time(&self, track: impl Iterator<Item = (f64, f64, f64)>, since_s: f64) -> Option<FavouredTime> {
+        let is_favoured = |at: Place| (self.weight)(self.map.get(self.cell(at))) > 0.0;
+        let mut spans = [[0.0; 2]; 2];
+        let mut last: Option<(f64, Place)> = None;
+        for (at_s, east, north) in track {
+            if let Some((from_s, from)) = last.replace((at_s, (east, north))) {
+                let middle = ((from.0 + east) / 2.0, (from.1 + north) / 2.0);
+                let span = &mut spans[usize::from(from_s < since_s)];
+                span[0] += at_s - from_s;
+                span[1] += if is_favoured(middle) { at_s - from_s } else { 0.0 };
+            }
+        }
+        let share = |[all, favoured]: [f64; 2]| (all >= MIN_SPAN_S).then(|| (favoured / all * 1000.0).round() / 1000.0);
+        let [since, before] = spans.map(share);
+        Some(FavouredTime { since_s, share: since?, before })
+    }
+
+    fn cell(&self, (east, north): Place) -> Cell {
+        let index = |metres: f64| (metres / self.cell_m).floor() as i32;
+        Cell::new(index(east), index(north))
+    }
+
     /// What a path is for, of which each leg has an end and a purpose. The vehicle leaves `from` at `since_s` with `speed_m_s`.
     pub fn aims(&self, from: Place, legs: &[(Place, Purpose)], since_s: f64, speed_m_s: f64) -> PlanAims {
         let mut stretches = self.stretches(from, legs);
@@ -256,6 +283,18 @@ mod tests {
         assert_eq!(reason(Some(Intent::Label(4))), Some(LegReason::Expected));
         assert_eq!(reason(Some(Intent::Unseen)), Some(LegReason::Unseen));
         assert_eq!(reason(None), Some(LegReason::Survey), "before the first weights");
+    }
+
+    #[test]
+    fn the_time_over_favoured_floor_is_told_before_and_since_an_order() {
+        let (map, weight) = (floor(), |label: u8| if label == 4 { 0.8 } else { 0.0 });
+        let ground = Ground { map: &map, cell_m: 0.25, weight: &weight, reach_m: 2.0 };
+        // Half a metre a second to the east: label 4 from 40 s to 52 s, then it stays there until 100 s.
+        let track = |to: u32| (0..=to).map(|s| (f64::from(s), (f64::from(s) / 2.0).min(23.0), 0.0));
+        let told = ground.favoured_time(track(100), 50.0).unwrap();
+        assert_eq!((told.since_s, told.share, told.before), (50.0, 1.0, Some(0.2)));
+        assert_eq!(ground.favoured_time(track(100), 10.0).unwrap().before, None, "10 s are too few");
+        assert_eq!(ground.favoured_time(track(60), 50.0), None, "the order is 10 s old");
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use placer::FoundFrame;
 pub use registration::RegisteredFrame;
 pub use scenecast_registration::CameraFinding;
-pub use steering::{Course, Footprint, Steering};
+pub use steering::{Alternative, Course, Footprint, Steering};
 pub use vehicle::{
     AppliedSlot, Durable, Evidence, KeptBudget, KeptGoals, KeptKeys, KeptLimits, KeptUtility, LostOrders, MapSelection,
     MappedFrame, Vehicle, VehicleDisk, VehicleOutput,

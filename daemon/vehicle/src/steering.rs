@@ -4,7 +4,7 @@ mod ahead;
 mod grounds;
 mod to_place;
 
-pub use ahead::PathAhead;
+pub use ahead::{Alternative, PathAhead};
 
 use grounds::{Grounds, PlannerChoice};
 use to_place::Views;

@@ -52,6 +52,18 @@ export default [
     },
   },
   {
+    name: "the vehicle's panel tells what came of the weights",
+    scenario: "rich",
+    async run(s) {
+      await firstLabels(s);
+      assert.ok(!(await s.page.locator("#vehicle").innerText()).includes("Over favoured"), "no label is favoured");
+      await s.steer({ favoured_time: { since_s: 10, share: 0.376, before: 0.09 } });
+      await s.shows("#vehicle", /Over favoured.*38 % of the time, before the order 9 %/s);
+      await s.steer({ favoured_time: { since_s: 10, share: 0.376, before: null } });
+      await s.shows("#vehicle", /38 % of the time(?!, before)/);
+    },
+  },
+  {
     name: "the first mission follows the state, and stays closed once it is closed",
     long: true,
     scenario: "rich",

@@ -4,10 +4,10 @@ use super::facts::MissionFacts;
 use super::{exemplar, facts, link};
 use crate::record::{StoredDraft, StoredMarker, StoredNote};
 use crate::state::{
-    AppliedOrder, DirectiveSlots, EarlierMap, FloorSummary, InForceKnowledge, MapLabel, MapLabelTree, MapSummary,
-    OrderProgress, OrderStatus, OtherSurface, PlanAims, PlannedPath, ReportedDisk, ReportedFault, ReportedPose,
-    ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker, VehicleNote,
-    VehicleOrders, VehicleSettings, VehicleState, WeightDraft, seconds,
+    AppliedOrder, DirectiveSlots, EarlierMap, FavouredTime, FloorSummary, InForceKnowledge, MapLabel, MapLabelTree,
+    MapSummary, OrderProgress, OrderStatus, OtherSurface, PlanAims, PlannedPath, ReportedDisk, ReportedFault,
+    ReportedPose, ReportedRegistration, ReportedTie, StatusReport, UsblMeasurement, UtilityTerms, VehicleMarker,
+    VehicleNote, VehicleOrders, VehicleSettings, VehicleState, WeightDraft, seconds,
 };
 use crate::{Ground, Purpose, SettingsOrder, Surface, Track, VehicleRecord, order_name};
 use scenecast_protocol::coordinates::MapPoint;
@@ -39,6 +39,7 @@ fn vehicle(
         other_surface: other_surface(&view, now),
         status: record.status(&view).map(|(s, at)| status(s, record, &view, *at)),
         aims: aims(surface, address, record, &view, facts),
+        favoured_time: favoured_time(surface, address, record, &view, facts),
         track: track(&record.track),
         registration: record.registration.latest().map(registration),
         closed_loops: track(record.registration.closures()),
@@ -231,6 +232,24 @@ fn aims(
     let ground = Ground { map, cell_m, weight: &weight, reach_m: facts.reach_m };
     let speed_m_s = record.track.speed_m_s().unwrap_or(facts.survey_m_s);
     (!legs.is_empty()).then(|| ground.aims(status.position.xy(), &legs, seconds(*at), speed_m_s))
+}
+
+/// What has come of the weights in force.
+fn favoured_time(
+    surface: &Surface,
+    address: Address,
+    record: &VehicleRecord,
+    view: &PeerView<'_>,
+    facts: &MissionFacts,
+) -> Option<FavouredTime> {
+    let map = surface.map(address).filter(|_| record.earlier_map().is_none())?;
+    let is_applied =
+        |slot: &&SlotProgress| slot.id == SlotId::Utility && slot.status == directive::OrderStatus::Applied;
+    let since_s = view.slots().find(is_applied).map(|slot| seconds(slot.changed))?;
+    let favours = record.orders.utility.weights.values().any(|weight| *weight > 0);
+    let weight = |label| record.weight(label);
+    let ground = Ground { map, cell_m: view.cell_m().unwrap_or(facts.cell_m), weight: &weight, reach_m: facts.reach_m };
+    favours.then(|| ground.favoured_time(track(&record.track).into_iter(), since_s)).flatten()
 }
 
 fn track(track: &Track) -> Vec<(f64, f64, f64)> {

@@ -62,6 +62,17 @@ pub struct PlanAims {
     pub targets: Vec<(i32, i32, i32)>,
 }
 
+/// The part of its time that a vehicle is over floor that its weights favour, by its reported track and the map as it is now.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FavouredTime {
+    /// Mission time at which the surface learned that the weights are applied.
+    pub since_s: f64,
+    /// The part of the time since then, 0 to 1.
+    pub share: f64,
+    /// The part of the time before, as far as the track goes back; null if that is less than half a minute.
+    pub before: Option<f64>,
+}
+
 /// What a vehicle would do by weights that are not sent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DryRun {

@@ -3,7 +3,7 @@
 use super::labels::{MapLabel, MapLabelTree};
 use super::link::VehicleChannel;
 use super::map::MapSummary;
-use super::plan::PlanAims;
+use super::plan::{FavouredTime, PlanAims};
 use super::storage::{VehicleMarker, VehicleNote};
 use crate::{AreasOrder, DestinationOrder, FenceOrder, LabelBook, LimitsOrder, SettingsOrder};
 use scenecast_protocol::wire::VehicleMode;
@@ -33,6 +33,9 @@ pub struct VehicleState {
     /// What its reported plan is for, by the map at the surface; null without a plan.
     #[serde(default)]
     pub aims: Option<PlanAims>,
+    /// How much of its time it is over floor of favoured labels; null without weights that favour any.
+    #[serde(default)]
+    pub favoured_time: Option<FavouredTime>,
     /// Mission time, metres east and metres north on the vehicle's map of the last 500 reports.
     pub track: Vec<(f64, f64, f64)>,
     /// How its last camera frames were placed on the map; null if the vehicle never reported it.

@@ -1,8 +1,9 @@
 //! The planned path after the waypoint: as it is reported, its purpose, and whether a new plan is better than the present one.
 
 use super::Steering;
-use crate::planning::{BlockValues, Interest, Node, PlanRequest, Point, distance};
+use crate::planning::{BlockValues, Interest, Lattice, Node, PlanRequest, Point, distance};
 use scenecast_protocol::directive::{Utility, WeightedArea};
+use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::wire::{Intent, PlannedPath};
 
 /// A path, reduced to its corners.
@@ -61,7 +62,47 @@ pub struct PathAhead {
     pub continues: bool,
 }
 
+/// The nearest floor that is known to be of a favoured label and worth a look, as a goal beside the plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alternative {
+    /// Metres east and north in the world frame, and the length of the path to it.
+    pub at: Point,
+    pub metres: f64,
+    /// The expected gain of a metre of the path to it, and of a metre of the plan: square metres of weight 1.
+    pub gain_a_metre: f64,
+    pub of_plan: f64,
+}
+
 impl Steering {
+    /// The nearest known floor of a favoured label from `from`, beside the plan of the last [`Self::next`]; `None` if there is none, or
+    /// the vehicle is there.
+    pub fn alternative(&self, from: Point, map: &LabelGrid, utility: &Utility) -> Option<Alternative> {
+        let (lattice, from) = (self.grounds.lattice(), self.grounds.entry(from)?);
+        let values = |utility, areas| {
+            let frame = (&self.window, self.map_origin);
+            BlockValues::new(lattice, frame, map, &self.known, Interest { utility, areas })
+        };
+        let weights =
+            utility.weights.iter().filter(|(_, weight)| **weight > 0).map(|(&label, &weight)| (label, weight));
+        let favoured = Utility { weights: weights.collect(), epoch: utility.epoch, ..Utility::default() };
+        let cells_in_block = (lattice.step_m() / self.window.cell_m).powi(2);
+        let noticed = NOTICED * Interest::in_labels(&favoured).largest_weight() * cells_in_block;
+        let known = values(&favoured, &[]);
+        let is_there = |node: Node| known.shown(node).iter().any(|&block| f64::from(known.of_seen(block)) > noticed);
+        let paths = lattice.paths(from);
+        let reached = (0..lattice.places()).filter(|&node| paths.metres[node].is_finite() && is_there(node));
+        let nearest = reached.min_by(|&a, &b| paths.metres[a].total_cmp(&paths.metres[b]))?;
+        let all = values(utility, &self.areas);
+        let plan: Vec<Node> = self.plan.iter().copied().collect();
+        let gain_of = |path: &[Node]| gain_a_metre(lattice, &all, from, path) * self.window.cell_m.powi(2);
+        (nearest != from).then(|| Alternative {
+            at: lattice.place(nearest),
+            metres: paths.metres[nearest],
+            gain_a_metre: gain_of(&paths.to(nearest)),
+            of_plan: gain_of(&plan),
+        })
+    }
+
     /// The plan after the last waypoint of [`Self::next`], from which `left_m` metres may be travelled.
     pub fn path_after(&self, waypoint: Point, left_m: f64) -> PathAhead {
         let left_m = left_m - self.grounds.last_leg_m();
@@ -163,6 +204,8 @@ fn parts<'a>(Interest { utility, areas }: Interest<'a>) -> Vec<Part<'a>> {
 /// planner a tenth of its gain.
 const TURN_BACK: f64 = 1.3;
 const IN_ROUNDS: f64 = 1.15;
+/// The part of a block's cells, each of the largest weight and not looked at, from which floor is known to be of a favoured label.
+const NOTICED: f64 = 0.15;
 /// The mean value of a cell, divided by the largest weight, from which a look at it pays: a fifth look at a favoured label
 /// does, and a sixth one does not.
 const PAYS: f64 = 0.02;
@@ -177,8 +220,8 @@ pub(super) fn margin(plan: &[Node], before: Option<Node>, is_in_rounds: bool) ->
 
 /// Whether the present plan is kept although another one was made from the same place.
 pub(super) fn keeps(q: &PlanRequest<'_>, present: &[Node], other: &[Node], margin: f64) -> bool {
-    let rate = gain_a_metre(q, present);
-    rate > 0.0 && gain_a_metre(q, other) < margin * rate
+    let rate = gain_a_metre(q.lattice, q.values, q.from, present);
+    rate > 0.0 && gain_a_metre(q.lattice, q.values, q.from, other) < margin * rate
 }
 
 /// Whether a path shows a block of which the cells are worth another look.
@@ -205,11 +248,11 @@ pub(super) fn gain(values: &BlockValues, path: &[Node]) -> Gain {
 }
 
 /// The gain of a path for each of its metres.
-fn gain_a_metre(q: &PlanRequest<'_>, path: &[Node]) -> f64 {
-    let places = std::iter::once(&q.from).chain(path);
-    let metres: f64 = places.zip(path).map(|(&a, &b)| distance(q.lattice.place(a), q.lattice.place(b))).sum();
+fn gain_a_metre(lattice: &Lattice, values: &BlockValues, from: Node, path: &[Node]) -> f64 {
+    let places = std::iter::once(&from).chain(path);
+    let metres: f64 = places.zip(path).map(|(&a, &b)| distance(lattice.place(a), lattice.place(b))).sum();
     // A stop and a turn cost as much as one step of the lattice.
-    gain(q.values, path).whole / (metres + q.lattice.step_m())
+    gain(values, path).whole / (metres + lattice.step_m())
 }
 
 #[cfg(test)]

@@ -35,6 +35,7 @@ export function startVehicle() {
     ["waypoint", "Waypoint", "Distance and direction from the reported position to the next place of the plan"],
     ["path", "Path", "The plan from the reported position through the waypoint to the last reported place; dashed on the map"],
     ["arrival", "Target", "What the plan leads to first, and when the vehicle gets there at its speed"],
+    ["favoured", "Over favoured", "The part of its time that the vehicle is over floor of favoured labels, by its track and the map as it is now: since the surface learned that the weights are applied, and before"],
     ["cells", "Vehicle's map", "Explored cells and labels of the vehicle's own map, by its last report"],
     ["contact", "Next contact", "When the next frame of the vehicle is due"],
     ["disk", "Vehicle's disk", "The files that the vehicle cannot write, and its free space, by its last report"],
@@ -76,6 +77,8 @@ function update() {
   const arrival = isStale(v) ? null : arrivalText(v);
   values.arrival(arrival ?? "");
   show(lines.arrival, arrival !== null);
+  values.favoured(v.favoured_time ? favouredText(v.favoured_time) : "");
+  show(lines.favoured, Boolean(v.favoured_time));
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
   values.disk(disk(s?.disk));
@@ -141,6 +144,9 @@ function arrivalText({ aims, status }) {
   if (leftS > 0) return `at ${what} in about ${span(leftS)}`;
   return first.along_m === 0 ? `at ${what} now` : null;
 }
+
+const favouredText = ({ share, before }) =>
+  `${Math.round(100 * share)} % of the time${before === null ? "" : `, before the order ${Math.round(100 * before)} %`}`;
 
 const makeSlot = () => h("li.slot", {}, h("span.name"), h("span.version"), h("span.state"), h("span.since"));
 
