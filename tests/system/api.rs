@@ -397,15 +397,18 @@ fn command_passes_from_one_operator_to_another_in_a_shell() {
     assert!(ok("bob", &["command"]).contains("nobody has it"));
     ok("anna", &["budget", "set", "900"]);
     assert!(ok("bob", &["command"]).contains("anna (ctl-"), "the first order took command");
-    refused("bob", &["budget", "set", "800"], &["anna has command for", "request it", "take it after"]);
-    refused("bob", &["command", "take"], &["anna has command for"]);
+    refused("bob", &["budget", "set", "800"], &["anna has had command for", "request it", "take it after"]);
+    refused("bob", &["command", "take"], &["anna has had command for"]);
     refused("victor", &["command", "request"], &["needs the role operator", "the role of victor is viewer"]);
     refused("victor", &["hold"], &["needs the role operator"]);
     refused("victor", &["note", "hello"], &["needs the role operator"]);
     let log = ok("anna", &["log", "--kind", "refused"]);
-    assert!(log.contains("budget: 800 bit/s: not sent: anna has command"), "{log}");
-    assert!(log.contains("set constraints: not sent: this needs the role operator"), "{log}");
-    assert!(log.contains("add note: not sent: this needs the role operator"), "{log}");
+    assert!(log.contains("budget: 800 bit/s: not sent: anna has had command"), "{log}");
+    assert!(
+        log.contains("orders the vehicle to hold, to abort, or to resume its survey: not sent: this needs"),
+        "{log}"
+    );
+    assert!(log.contains("adds a note about the vehicle: not sent: this needs the role operator"), "{log}");
     ok("bob", &["hold"]);
     let abort = r#"{"action": "abort"}"#;
     assert_eq!(http(port, "POST", "/api/v2/vehicles/1/constraints", &headers[1], abort).unwrap().0, 202);

@@ -79,7 +79,7 @@ impl CommandAction {
 pub enum CommandRefusal {
     #[error("this needs the role {needed}; the role of {name} is {role}")]
     Role { name: String, role: Role, needed: Role },
-    #[error("{holder} has command for {} and was last active {} ago: {}", span(*.held), span(*.idle), remedy(*.idle))]
+    #[error("{holder} has had command for {} and was last active {} ago: {}", span(*.held), span(*.idle), remedy(*.idle))]
     Held { holder: String, held: Duration, idle: Duration },
     #[error("{name} has command at another client{}: take command to move it here", named(client))]
     Elsewhere { name: String, client: ClientName },

@@ -37,7 +37,7 @@ fn the_first_order_takes_command_and_others_are_refused() {
     let refusal = command.check(&bob, OrderKind::Order, at(35)).unwrap_err().to_string();
     assert_eq!(
         refusal,
-        "anna has command for 34 s and was last active 34 s ago: request it, or take it after 1 min 26 s more without a \
+        "anna has had command for 34 s and was last active 34 s ago: request it, or take it after 1 min 26 s more without a \
          sign of the holder"
     );
     assert!(command.check(&bob, OrderKind::Stop, at(35)).is_ok());
@@ -197,7 +197,7 @@ fn a_refused_request_for_command_is_in_the_log() {
     assert!(matches!(ask(bob.clone(), CommandAction::Take), Reply::NotInCommand(_)));
     assert!(matches!(ask(bob, CommandAction::Keep), Reply::Command(_)), "a sign of presence asks for nothing");
     let refused: Vec<_> = surface.log().entries().filter(|entry| entry.kind == LogKind::Refused).collect();
-    let told = "taking of command: refused: anna has command for 0 s";
+    let told = "taking of command: refused: anna has had command for 0 s";
     assert!(refused.len() == 1 && refused[0].by.as_deref() == Some("bob"), "{refused:?}");
     assert!(refused[0].text.starts_with(told), "{}", refused[0].text);
 }

@@ -1,10 +1,11 @@
 //! The surface keeps the log of the mission.
 
 use super::Surface;
-use super::command::{CommandChange, CommandChangeKind};
-use super::log::{LogKind, MissionLog};
+use super::command::{COMMAND_SILENCE, CommandChange, CommandChangeKind};
+use super::log::{LogEntry, LogKind, MissionLog};
 use super::orders::order_name;
 use super::record::StoredLogEntry;
+use super::reported_orders::why_refused;
 use scenecast_protocol::directive::{OrderStatus, SlotId};
 use scenecast_protocol::map::Relabelled;
 use scenecast_protocol::time::Instant;
@@ -47,12 +48,12 @@ impl Surface {
     }
 
     pub(super) fn log_command(&mut self, change: &CommandChange) {
-        let from = |text: &str| match change.from.as_ref().filter(|from| **from != change.by) {
-            Some(from) => format!("{text} from {from}"),
-            None => text.to_owned(),
-        };
+        let silence_min = COMMAND_SILENCE.as_secs() / 60;
         let text = match (change.kind, &change.to) {
-            (CommandChangeKind::Taken, _) => from("takes command"),
+            (CommandChangeKind::Taken, _) => match &change.from {
+                Some(from) => format!("takes command from {from}, who has given no sign for {silence_min} min"),
+                None => "takes command".to_owned(),
+            },
             (CommandChangeKind::Moved, _) => "moves command to another client".to_owned(),
             (CommandChangeKind::HandedOver, Some(to)) => format!("hands command over to {to}"),
             (CommandChangeKind::HandedOver, None) => "hands command over".to_owned(),
@@ -71,7 +72,10 @@ impl Surface {
             OrderStatus::Applied if slot == SlotId::Fix => return,
             OrderStatus::Applied => format!("{name} version {version} applied"),
             OrderStatus::Withdrawn(_) if matches!(slot, SlotId::Fix | SlotId::Requests) => return,
-            OrderStatus::Refused(reason) => format!("{name} version {version} refused: {}", reason.explain()),
+            OrderStatus::Refused(reason) => {
+                let why = self.records.get(&vehicle).map(|record| why_refused(record, &decided.slot, reason));
+                format!("{name} version {version} refused: {}", why.as_deref().unwrap_or(reason.explain()))
+            }
             OrderStatus::Withdrawn(why) => format!("{name} version {version} withdrawn: {}", why.explain()),
             _ => return,
         };
@@ -121,7 +125,10 @@ impl Surface {
         let Some((status, _)) = self.link.vehicle(vehicle).and_then(|view| view.status()) else { return };
         let Some((record, view)) = self.records.get(&vehicle).zip(self.link.vehicle(vehicle)) else { return };
         let text = record.mode_text(status, &view);
-        if self.watches.entry(vehicle).or_default().handle_mode(status.mode, status.reason) {
+        let is_mode = |entry: &&LogEntry| entry.vehicle == Some(vehicle) && entry.kind == LogKind::Mode;
+        let logged = self.log.entries().rev().find(is_mode).map(|entry| entry.text.as_str());
+        let mode = (status.mode, status.reason);
+        if self.watches.entry(vehicle).or_default().handle_mode(mode, &text, logged) {
             self.log_fact(vehicle, LogKind::Mode, &text, now);
         }
     }

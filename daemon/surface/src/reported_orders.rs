@@ -2,7 +2,7 @@
 
 use super::given_orders::SentOrder;
 use super::vehicle_record::VehicleRecord;
-use scenecast_protocol::directive::{OrderStatus, Slot, SlotId};
+use scenecast_protocol::directive::{Destination, OrderStatus, RefusalReason, Slot, SlotId};
 use scenecast_protocol::link::{InForce, PeerView};
 use scenecast_protocol::map::MAX_LABEL;
 
@@ -65,7 +65,53 @@ fn follow_order<T: Clone + Default + PartialEq>(
     }
 }
 
+/// Why the vehicle has refused an order: by the orders in force, where its own reason is more general.
+pub(super) fn why_refused(record: &VehicleRecord, slot: &Slot, reason: RefusalReason) -> String {
+    let fence = record.orders.fence.in_force.as_ref().map(|(_, fence)| fence);
+    match (slot, reason, fence) {
+        (Slot::Destination(Destination { place: Some(place) }), RefusalReason::Contradiction, Some(fence)) => {
+            let kept_out = fence.keep_outs.iter().position(|outline| outline.contains(*place));
+            match kept_out {
+                _ if fence.fence.as_ref().is_some_and(|outline| !outline.contains(*place)) => {
+                    "the place lies outside of the fence in force".to_owned()
+                }
+                Some(index) => format!("the place lies in keep-out {} of the fence in force", index + 1),
+                None => "the place is too near to an outline of the fence in force, or no way leads there".to_owned(),
+            }
+        }
+        (Slot::Destination(_), RefusalReason::Contradiction, None) => "no way leads to the place".to_owned(),
+        _ => reason.explain().to_owned(),
+    }
+}
+
 /// The status of this surface's last order of a kind.
 pub(super) fn status(view: &PeerView<'_>, id: SlotId) -> Option<OrderStatus> {
     view.slots().find(|slot| slot.id == id).map(|slot| slot.status)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::{Fence, Polygon};
+
+    #[test]
+    fn a_refused_place_is_explained_by_the_fence_in_force() {
+        let square = |from: i32, to: i32| {
+            Polygon([(from, from), (to, from), (to, to), (from, to)].map(|(x, y)| DecimetrePoint::new(x, y)).to_vec())
+        };
+        let mut record = VehicleRecord::new("gannet".to_owned());
+        let why = |record: &VehicleRecord, x, y| {
+            let place = Some(DecimetrePoint::new(x, y));
+            why_refused(record, &Slot::Destination(Destination { place }), RefusalReason::Contradiction)
+        };
+        assert_eq!(why(&record, 900, 0), "no way leads to the place");
+        let fence = Fence { fence: Some(square(0, 500)), keep_outs: vec![square(100, 200)], return_point: None };
+        record.orders.fence.in_force = Some((1, fence));
+        assert_eq!(why(&record, 900, 0), "the place lies outside of the fence in force");
+        assert_eq!(why(&record, 150, 150), "the place lies in keep-out 1 of the fence in force");
+        assert!(why(&record, 499, 499).starts_with("the place is too near"));
+        let limits = why_refused(&record, &Slot::Limits(Default::default()), RefusalReason::Unable);
+        assert_eq!(limits, RefusalReason::Unable.explain());
+    }
 }

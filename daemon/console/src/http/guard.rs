@@ -75,7 +75,8 @@ fn is_viewer(path: &str, origin: &str) -> bool {
 #[derive(Clone)]
 pub(super) struct Need {
     pub(super) role: Role,
-    pub(super) id: &'static str,
+    /// A text that begins with what it does.
+    pub(super) what: &'static str,
     /// Whether it changes something, so that the log has who wanted it.
     pub(super) is_logged: bool,
 }
@@ -94,7 +95,8 @@ pub(super) async fn require_role(
             if need.is_logged {
                 let mut parts = request.uri().path().split('/').skip_while(|part| *part != "vehicles");
                 let vehicle = parts.nth(1).and_then(|id| id.parse().ok());
-                let what = format!("{}: not sent: {line}", need.id.replace('_', " "));
+                let what = need.what.split(['.', ';']).next().unwrap_or_default();
+                let what = format!("{}{}: not sent: {line}", what[..1].to_lowercase(), &what[1..]);
                 shared.note(by, SurfaceRequest::Barred(vehicle, what));
             }
             error(StatusCode::FORBIDDEN, &line)

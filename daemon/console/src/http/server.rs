@@ -95,7 +95,8 @@ fn router(shared: Shared) -> Router {
             o.path,
             match o.role {
                 Some(role) => {
-                    let need = guard::Need { role, id: o.id, is_logged: o.method != axum::http::Method::GET };
+                    let is_logged = o.method != axum::http::Method::GET;
+                    let need = guard::Need { role, what: o.summary, is_logged };
                     let state = (need, shared.clone());
                     route.route_layer(axum::middleware::from_fn_with_state(state, guard::require_role))
                 }

@@ -5,10 +5,10 @@ use super::order_step::OrderKey;
 use super::track_point::TrackPoint;
 use super::{Escaped, words};
 use scenecast_core::utc_text;
-use scenecast_messages::scenecast_msgs::OrderStatus;
+use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::directive::{Fence, Polygon, SlotId, WeightedArea};
-use scenecast_protocol::wire::VehicleMode;
+use scenecast_protocol::wire::{ModeReason, VehicleMode};
 use scenecast_surface::state::VehicleState;
 use scenecast_surface::{AreasOrder, DestinationOrder, FenceOrder};
 use serde_json::Value;
@@ -17,6 +17,8 @@ use std::fmt::Write;
 
 /// Farther from its place, a vehicle has not arrived there, metres.
 const ARRIVED_M: f64 = 3.0;
+/// A vehicle that holds stays within this distance, metres.
+const STANDS_M: f64 = 2.0;
 
 /// What an order asks of the way of a vehicle.
 enum Aim {
@@ -30,6 +32,8 @@ enum Aim {
     Fence(Fence),
     /// To stay where it is.
     Hold,
+    /// To end the survey.
+    Abort,
 }
 
 impl Aim {
@@ -58,7 +62,10 @@ impl Aim {
         if slot == SlotId::Constraints.name() {
             let members = members()?;
             let is_set = |name: &str| members.get(name).and_then(Value::as_bool).unwrap_or_default();
-            return (is_set("hold") && !is_set("abort")).then_some(Self::Hold);
+            return match (is_set("abort"), is_set("hold")) {
+                (true, _) => Some(Self::Abort),
+                (false, is_held) => is_held.then_some(Self::Hold),
+            };
         }
         let fence = (slot == SlotId::Fence.name()).then(|| serde_json::from_str::<FenceOrder>(content))?.ok()?;
         fence.read().ok().map(Self::Fence).filter(|_| fence.fence.is_some() || !fence.keep_outs.is_empty())
@@ -201,7 +208,7 @@ impl Dive {
             page,
             "<h3>What came of these orders</h3>\n<p>{path} Labels are those of the map at the end, each by itself, as the order weighed them, \
              without those that were merged into it. Other orders may have been in force at the same time: one to hold, or to go to a place, \
-             goes before weights.</p>\n<table><thead><tr><th>what was ordered</th><th>in force from (UTC)</th><th>to</th>\
+             takes precedence over weights.</p>\n<table><thead><tr><th>what was ordered</th><th>in force from (UTC)</th><th>to</th>\
              <th>where the vehicle was meanwhile</th></tr></thead>\n{rows}</table>"
         );
     }
@@ -234,6 +241,7 @@ impl Way<'_> {
             Aim::Place(place) => return self.arrival(*place),
             Aim::Fence(fence) => self.fenced(fence)?,
             Aim::Hold => self.held()?,
+            Aim::Abort => self.aborted()?,
         };
         Some((told, self.span_s.1))
     }
@@ -316,9 +324,18 @@ impl Way<'_> {
         let stay =
             self.vehicle.stay(self.span_s, |_| true, |point| decimetres(point).is_some_and(|at| fence.allows(at)));
         let out_s = stay.all_s - stay.there_s;
-        (stay.all_s > 0.0).then(|| match out_s < 0.05 {
-            true => "where it allows, all the time".to_owned(),
-            false => format!("where it does not allow, for {} in all", self.dive.lasted(out_s)),
+        let is_breach = |(at_s, event): &(f64, &Event)| {
+            let reason = event.text.rsplit_once(": ").map(|(_, reason)| reason);
+            (self.span_s.0..=self.span_s.1).contains(at_s) && reason.is_some() && reason == ModeReason::Fence.name()
+        };
+        let breach = self.dive.modes(self.state, self.vehicle).find(is_breach);
+        (stay.all_s > 0.0).then(|| match (out_s < 0.05, breach) {
+            (true, None) => "where it allows, all the time".to_owned(),
+            (true, Some((at_s, _))) => format!(
+                "where it allows, at all places that are known, but by {} it reported that it had been where it does not allow",
+                utc_text(at_s)
+            ),
+            (false, _) => format!("where it does not allow, for {} in all", self.dive.lasted(out_s)),
         })
     }
 
@@ -326,7 +343,19 @@ impl Way<'_> {
         let first = self.places().next()?;
         let farthest_m = self.places().map(|point| first.distance_m(point)).fold(0.0, f64::max);
         let (east, north) = (words::east(first.east_m), words::north(first.north_m));
-        Some(format!("at {east}, {north}, at most {farthest_m:.1} m from there"))
+        Some(match farthest_m < STANDS_M {
+            true => format!("it stood at {east}, {north}, at most {farthest_m:.1} m from there"),
+            false => format!(
+                "it did not stand still: it was up to {farthest_m:.1} m away from {east}, {north}, where it was then"
+            ),
+        })
+    }
+
+    /// Where it was when an abort was replaced, or at the end.
+    fn aborted(&self) -> Option<String> {
+        let last = self.places().last()?;
+        let (east, north) = (words::east(last.east_m), words::north(last.north_m));
+        Some(format!("its last place is {east}, {north}, at a depth of {:.1} m", last.depth_m))
     }
 }
 
@@ -348,6 +377,10 @@ mod tests {
 
     /// What is told of a vehicle that goes a metre a second to the east, over label 1 for ten seconds and over label 2 then.
     fn told(orders: &[(&str, i64, &str)]) -> String {
+        told_with(Vec::new(), orders)
+    }
+
+    fn told_with(events: Vec<(f64, Event)>, orders: &[(&str, i64, &str)]) -> String {
         let place =
             |n: u32| TrackPoint { at_s: f64::from(n), east_m: f64::from(n), north_m: 0.5, depth_m: 5.0, sigma_m: 0.1 };
         let track = (0..=20).step_by(5).map(place).collect();
@@ -364,7 +397,7 @@ mod tests {
             vehicle.take_order(&status);
             vehicle.given.insert((slot.clone(), version), Order { slot, version, content, ..Order::default() });
         }
-        let (mut dive, mut page) = (Dive::default(), String::new());
+        let (mut dive, mut page) = (Dive { events, ..Dive::default() }, String::new());
         dive.state.mission.speed = 1.0;
         dive.effects_table(&mut page, &VehicleState::default(), &vehicle);
         page
@@ -402,9 +435,21 @@ mod tests {
     fn a_fence_is_told_by_the_time_outside_and_a_hold_by_its_place() {
         let fence = |east_m: u32| format!(r#"{{"fence": [[-1, -1], [{east_m}, -1], [{east_m}, 2], [-1, 2]]}}"#);
         assert!(told(&[("fence", 0, &fence(30))]).contains("where it allows, all the time"));
+        let mode = |at_s: f64, text: &str| {
+            (at_s, Event { source: "mode".to_owned(), text: text.to_owned(), ..Event::default() })
+        };
+        let page = told_with(vec![mode(9.0, "returning: fence")], &[("fence", 0, &fence(30))]);
+        assert!(page.contains("but by 1970-01-01T00:00:09Z it reported that it had been where"), "{page}");
         let page = told(&[("fence", 0, &fence(16))]);
         assert!(page.contains("where it does not allow, for 4 s in all"), "{page}");
         let page = told(&[("constraints", 10, r#"{"hold": true, "abort": false}"#)]);
-        assert!(page.contains("at 10.0 m east, 0.5 m north, at most 10.0 m from there"), "{page}");
+        assert!(
+            page.contains("it did not stand still: it was up to 10.0 m away from 10.0 m east, 0.5 m north"),
+            "{page}"
+        );
+        let page = told(&[("constraints", 20, r#"{"hold": true, "abort": false}"#)]);
+        assert!(!page.contains("stood at"), "it was over at once: {page}");
+        let page = told(&[("constraints", 10, r#"{"hold": false, "abort": true}"#)]);
+        assert!(page.contains("its last place is 20.0 m east, 0.5 m north, at a depth of 5.0 m"), "{page}");
     }
 }

@@ -10,7 +10,7 @@ use std::fmt::Write;
 pub(super) fn told(LinkSummary { up, down, .. }: &LinkSummary) -> Option<String> {
     (up.frames > 0).then(|| {
         format!(
-            "Of the frames with numbers, the surface missed {:.1} % of those from the vehicles, and the vehicles did not acknowledge {:.1} % of \
+            "Of the numbered frames, the surface missed {:.1} % of those from the vehicles, and the vehicles did not acknowledge {:.1} % of \
              those to them; what these held of the map and of orders was sent again.",
             up.loss * 100.0,
             down.loss * 100.0

@@ -14,6 +14,8 @@ use std::fmt::Write;
 
 /// Images of a label in the report.
 const IMAGES: usize = 3;
+/// An image that was taken longer ago than this when it was sent has no time, seconds.
+const OLD_IMAGE_S: f64 = 4.0 * 3600.0;
 
 /// The images of the classes, and which have none.
 pub(super) fn of_classes(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
@@ -32,6 +34,7 @@ pub(super) fn of_classes(page: &mut String, dive: &Dive, state: &VehicleState, v
         };
         let _ = writeln!(page, "<h3>Images of the classes</h3>\n{sigma}<div class=\"images\">{all}</div>");
     }
+    further(page, dive, state, vehicle);
     if !bare.is_empty() {
         let _ = writeln!(page, "<p>Classes of which no image was received: {}.</p>", Escaped(&bare.join(", ")));
     }
@@ -100,19 +103,25 @@ fn asked_s(vehicle: &DiveVehicle, label: u8) -> Vec<f64> {
 }
 
 /// When an image was asked for, taken and received; nobody asked for most.
-fn times(vehicle: &DiveVehicle, at_s: f64, exemplar: &Exemplar) -> String {
+fn times(dive: &Dive, vehicle: &DiveVehicle, at_s: f64, exemplar: &Exemplar) -> String {
+    let utc = |utc: String| format!("<span class=\"t\">{utc}</span>");
+    let mission_s = (dive.span_s.1 - dive.span_s.0) * dive.state.mission.speed.max(1.0);
     let taken = match words::taken(exemplar) {
-        Some(taken) => format!("taken {taken}"),
+        Some(taken) => format!("taken {}", utc(taken)),
+        None if mission_s < OLD_IMAGE_S => "taken in an earlier run of the vehicle's program".to_owned(),
         None => "when it was taken is not known, as that was in an earlier run of the vehicle's program, or more than 4 h before it was sent"
             .to_owned(),
     };
     let asked_s = asked_s(vehicle, exemplar.label).into_iter().filter(|given_s| exemplar.requested && *given_s <= at_s);
-    let asked = asked_s.reduce(f64::max).map_or_else(String::new, |s| format!("asked for {}, ", utc_text(s)));
-    format!("{asked}{taken}, received {}", utc_text(at_s))
+    let asked = asked_s.reduce(f64::max).map_or_else(String::new, |s| format!("asked for {}, ", utc(utc_text(s))));
+    format!("{asked}{taken}, received {}", utc(utc_text(at_s)))
 }
 
-/// Images of a class, those that people asked for and the largest first, each with its label, time, place and scale.
-fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+/// Images with the times at which they came in.
+type Received<'a> = Vec<&'a (f64, Exemplar)>;
+
+/// The images of a class that are shown, those that people asked for and the largest, by time; and the others.
+fn of_class<'a>(state: &'a VehicleState, vehicle: &'a DiveVehicle, class: u8) -> (Received<'a>, Received<'a>) {
     // The label of a place may have changed since its image was sent.
     let shows_it = |exemplar: &Exemplar| vehicle.shows_class(state, exemplar);
     let of_it: Vec<_> = images_of(state, vehicle, class).collect();
@@ -121,21 +130,42 @@ fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -
     // Beside them those that the vehicle sent for the class.
     found.extend(of_it.iter().copied().filter(|(_, exemplar)| !shows_it(exemplar)));
     found.sort_by_key(|(_, exemplar)| !exemplar.requested);
-    let note = |exemplar: &Exemplar| match shows_it(exemplar) {
-        true => String::new(),
-        false => "; by the map at the end its place has another class".to_owned(),
-    };
-    let more = found.len().saturating_sub(IMAGES);
-    let more = if more == 0 { String::new() } else { format!("; beside these, {more} more of this class came in") };
-    found.truncate(IMAGES);
+    let others = found.split_off(found.len().min(IMAGES));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let shown = found.iter().enumerate();
-    shown
-        .clone()
-        .map(|(n, found)| {
-            image(dive, state, vehicle, found, &(note(&found.1) + if n + 1 == shown.len() { &more } else { "" }))
-        })
-        .collect()
+    (found, others)
+}
+
+/// The images of the classes that are not shown, as a table.
+fn further(page: &mut String, dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) {
+    let others = vehicle.map.classes.iter().flat_map(|class| of_class(state, vehicle, class.label).1);
+    let row = |(at_s, exemplar): &(f64, Exemplar)| {
+        let place = match exemplar.width_m > 0.0 {
+            true => format!("{}, {}", words::east(exemplar.middle.x), words::north(exemplar.middle.y)),
+            false => String::new(),
+        };
+        format!(
+            "<tr><td>{}</td><td>{place}</td><td>{}</td></tr>\n",
+            Escaped(&words::label(&state.label_book, exemplar.label)),
+            times(dive, vehicle, *at_s, exemplar)
+        )
+    };
+    let rows: String = others.map(row).collect();
+    if !rows.is_empty() {
+        let _ = writeln!(
+            page,
+            "<h3>Further images of the classes, which are not shown</h3>\n<table><thead><tr><th>label</th><th>place</th><th>times (UTC)</th></tr></thead>\n{rows}</table>"
+        );
+    }
+}
+
+/// Images of a class, each with its label, time, place and scale.
+fn images(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
+    let note = |exemplar: &Exemplar| match vehicle.shows_class(state, exemplar) {
+        true => "",
+        false => "; by the map at the end its place has another class",
+    };
+    let (shown, _) = of_class(state, vehicle, class);
+    shown.into_iter().map(|found| image(dive, state, vehicle, found, note(&found.1))).collect()
 }
 
 /// An image with its label, time, place and scale.
@@ -147,7 +177,7 @@ fn image(
     note: &str,
 ) -> String {
     let kind = if exemplar.format == "webp" { "webp" } else { "jpeg" };
-    let times = times(vehicle, *at_s, exemplar);
+    let times = times(dive, vehicle, *at_s, exemplar);
     let (middle, is_placed) = (&exemplar.middle, exemplar.width_m > 0.0);
     let class = state.label_book.shown_as(exemplar.label);
     let own = words::label(&state.label_book, exemplar.label);
@@ -193,13 +223,16 @@ mod tests {
         };
         order.header.stamp = Time::from_nanos(30_000_000_000);
         vehicle.given.insert(("requests".to_owned(), 1), order);
-        let told = |n: usize| times(&vehicle, vehicle.exemplars[n].0, &vehicle.exemplars[n].1);
-        assert_eq!(told(0), "taken 1970-01-01T00:00:07Z, received 1970-01-01T00:00:20Z");
-        assert!(
-            told(1).starts_with("asked for 1970-01-01T00:00:30Z, when it was taken is not known, as"),
-            "{}",
-            told(1)
-        );
-        assert_eq!(told(2), "taken 1970-01-01T00:00:45Z, received 1970-01-01T00:00:50Z");
+        let mut dive = Dive { span_s: (0.0, 5.0 * 3600.0), ..Dive::default() };
+        let told = |dive: &Dive, n: usize| {
+            let told = times(dive, &vehicle, vehicle.exemplars[n].0, &vehicle.exemplars[n].1);
+            told.replace("<span class=\"t\">", "").replace("</span>", "")
+        };
+        assert_eq!(told(&dive, 0), "taken 1970-01-01T00:00:07Z, received 1970-01-01T00:00:20Z");
+        let told_1 = told(&dive, 1);
+        assert!(told_1.starts_with("asked for 1970-01-01T00:00:30Z, when it was taken is not known, as"), "{told_1}");
+        dive.span_s.1 = 3600.0;
+        assert!(told(&dive, 1).contains("30Z, taken in an earlier run of the vehicle's program, received"));
+        assert_eq!(told(&dive, 2), "taken 1970-01-01T00:00:45Z, received 1970-01-01T00:00:50Z");
     }
 }

@@ -127,7 +127,7 @@ pub(super) fn grid(svg: &mut String, frame: &Frame) {
         let _ = writeln!(
             svg,
             "<path class=\"grid\" d=\"M0 {y:.1}H{WIDTH}\"/><text x=\"2\" y=\"{:.1}\">{north} m N</text>",
-            y - 3.0
+            (y - 3.0).max(11.0)
         );
     }
 }

@@ -17,8 +17,8 @@ use std::sync::LazyLock;
 
 const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#111;background:#fff}\
 table{border-collapse:collapse;width:100%;font-size:.9em}th,td{text-align:left;vertical-align:top;padding:.25em .6em;\
-border-bottom:1px solid #ccc}p,li{max-width:50em}td.n{text-align:right;white-space:nowrap}td.t{white-space:nowrap}td.o{min-width:15em}.wide{font-size:.8em}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
-svg text{font:11px system-ui,sans-serif}.border{stroke:#000;stroke-opacity:.55;stroke-width:.7;fill:none}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
+border-bottom:1px solid #ccc}p,li{max-width:50em}td.n{text-align:right;white-space:nowrap}td.t,.t{white-space:nowrap}td.o{min-width:15em}.wide{font-size:.8em}figure{margin:1em 0}figcaption{font-size:.85em}svg{width:100%;height:auto}\
+svg text{font:11px system-ui,sans-serif;paint-order:stroke;stroke:#fff;stroke-width:2.5px;stroke-linejoin:round}.border{stroke:#000;stroke-opacity:.55;stroke-width:.7;fill:none}.grid{stroke:#000;stroke-opacity:.25;stroke-width:.6;fill:none}\
 .track{fill:none;stroke:#000;stroke-width:1.5;stroke-linejoin:round}.line{fill:none;stroke:#000;stroke-width:1.2}\
 thead{display:table-header-group}.swatch,svg{-webkit-print-color-adjust:exact;print-color-adjust:exact}thead tr{break-after:avoid}.fence{fill:none;stroke:#000;stroke-width:1.5;stroke-dasharray:6 3}.area{fill:none;stroke:#000;stroke-dasharray:1 4}.out{fill:#000;fill-opacity:.12;stroke:#000;stroke-dasharray:2 2}.scale{fill:none;stroke:#000;stroke-width:1.5}.swatch{display:inline-block;width:1em;height:1em;border:1px solid #000;\
 vertical-align:-.15em;margin-right:.4em}.images{display:flex;flex-wrap:wrap;gap:.6em}.images figure{margin:0;width:188px}.images svg{width:112px}.images img{width:112px;display:block;\
@@ -44,6 +44,7 @@ impl Dive {
             self.vehicle(&mut page, state, vehicle);
         }
         self.changes_of_labels(&mut page);
+        self.changes_of_command(&mut page);
         self.events_table(&mut page);
         self.origin_of_figures(&mut page);
         page
@@ -70,7 +71,7 @@ impl Dive {
         let made_up: BTreeSet<String> = self.vehicles().filter_map(|(_, vehicle)| vehicle.made_up(self)).collect();
         let is_known = self.vehicles().all(|(_, vehicle)| !vehicle.own.settings.program.is_empty());
         let made_up: String = match made_up.is_empty() && !is_known {
-            true => ", of which these records do not say whether its motion and its images were real".to_owned(),
+            true => " (whether motion and images were real, these records do not say)".to_owned(),
             false => made_up.iter().map(|what| format!(", {what}")).collect(),
         };
         let credit = self.credit().map_or_else(String::new, |credit| format!("{}: ", Escaped(credit)));
@@ -122,7 +123,7 @@ impl Dive {
                  north of the mission's origin (WGS 84 where it has one); north is up.</figcaption></figure>",
                 legend(state, vehicle),
                 match vehicle.own.track.len() {
-                    0 | 1 => "straight lines between the places that the vehicle has reported",
+                    0 | 1 => "straight lines between the places that the vehicle reported",
                     _ => "by its own record",
                 },
                 if area.is_some() { "Dots: the area of the survey. " } else { "" },
@@ -144,19 +145,31 @@ impl Dive {
 
     /// Who named and merged labels, and when.
     fn changes_of_labels(&self, page: &mut String) {
-        let is_change = |event: &Event| {
+        self.table_of(page, ("Names and merges of labels", "vehicle"), |event| {
             event.source == LogKind::Record.name() && said(&event.text, |words| words.starts_with("label ")).is_some()
-        };
-        let rows = self.events.iter().filter(|(_, event)| is_change(event)).map(|(at_s, event)| {
+        });
+    }
+
+    /// Who had command, and how it passed.
+    fn changes_of_command(&self, page: &mut String) {
+        self.table_of(page, ("Who had command", ""), |event| event.source == LogKind::Command.name());
+    }
+
+    /// These events under a title, with the vehicle where it has a column.
+    fn table_of(&self, page: &mut String, (title, column): (&str, &str), is_it: impl Fn(&Event) -> bool) {
+        let rows = self.events.iter().filter(|(_, event)| is_it(event)).map(|(at_s, event)| {
             let (vehicle, told) = (Escaped(&event.vehicle), words::event(self.book(&event.vehicle), event));
             let (at, told) = (utc_text(*at_s), Escaped(&told));
-            format!("<tr><td class=\"t\">{at}</td><td class=\"t\">{vehicle}</td><td>{told}</td></tr>\n")
+            let vehicle = if column.is_empty() { String::new() } else { format!("<td class=\"t\">{vehicle}</td>") };
+            format!("<tr><td class=\"t\">{at}</td>{vehicle}<td>{told}</td></tr>\n")
         });
         let rows: String = rows.collect();
+        let column = if column.is_empty() { String::new() } else { format!("<th>{column}</th>") };
         if !rows.is_empty() {
-            *page += "<h2>Names and merges of labels</h2>\n<table><thead><tr><th>time (UTC)</th><th>vehicle</th><th>by whom, and what</th></tr></thead>\n";
-            *page += &rows;
-            *page += "</table>\n";
+            let _ = writeln!(
+                page,
+                "<h2>{title}</h2>\n<table><thead><tr><th>time (UTC)</th>{column}<th>by whom, and what</th></tr></thead>\n{rows}</table>"
+            );
         }
     }
 

@@ -60,7 +60,7 @@ pub(super) fn by_round_trip(dive: &Dive, vehicle: &DiveVehicle) -> String {
     };
     let range = match vehicle.has_modem(dive) {
         true => format!(
-            "A round trip has the way of the sound there and back, and the time that frames, modems and serial lines take; by the shortest one, \
+            "A round trip includes the way of the sound there and back, and the time that frames, modems and serial lines take; by the shortest one, \
              {least_s:.2} s, the vehicle was at some time no farther than {:.0} m away (at {SOUND_M_S} m/s), and how far it was at others is not \
              known.",
             least_s / 2.0 * SOUND_M_S

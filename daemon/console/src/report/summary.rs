@@ -37,12 +37,15 @@ pub(super) fn summary(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) 
     sent.extend(dive.link_sentences(vehicle));
     sent.extend(gaps::heard(dive, vehicle));
     sent.extend(trouble::modes(dive, state, vehicle));
-    vec![
+    let refused = trouble::refused(dive, state, vehicle);
+    let parts = [
         ("Where and when", made_up.into_iter().chain(dates).chain(way).collect()),
         ("What was found", map.into_iter().flatten().collect()),
         ("What was ordered and sent", sent),
         ("What went wrong", trouble::told(dive, state, vehicle)),
-    ]
+        ("What was refused", refused),
+    ];
+    parts.into_iter().filter(|(_, told)| !told.is_empty()).collect()
 }
 
 /// The moments of the comparison at which the vehicle surveyed, or all of them where its modes are not known.
@@ -285,7 +288,7 @@ fn not_sent(dive: &Dive, state: &VehicleState) -> String {
     match dive.not_sent(state).count() {
         0 => String::new(),
         n => format!(
-            " The surface refused {} of people and did not send {}: see what went wrong.",
+            " The surface refused {} of people and did not send {}: see what was refused.",
             counted(n, "request", "requests"),
             if n == 1 { "it" } else { "them" }
         ),

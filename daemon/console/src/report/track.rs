@@ -7,6 +7,8 @@ use super::track_point::{MAX_M_S, TrackPoint};
 const SPAN_S: f64 = 10.0;
 /// A slower vehicle stands, m/s.
 const LEAST_M_S: f64 = 0.05;
+/// Reports have the time at which they came in, which may be so much later than that of their place, seconds of the mission.
+const LATE_S: f64 = 10.0;
 
 impl DiveVehicle {
     /// Whether its own record has its path.
@@ -31,7 +33,8 @@ impl DiveVehicle {
             let is_repeated = a.distance_m(b) == 0.0;
             let from_s = if since_s.is_nan() { a.at_s } else { since_s };
             since_s = if is_repeated { from_s } else { f64::NAN };
-            let is_too_far = || a.is_too_far(b, (b.at_s - from_s) * self.mission_speed, max_m_s);
+            let late_s = if self.has_own_path() { 0.0 } else { LATE_S };
+            let is_too_far = || a.is_too_far(b, (b.at_s - from_s) * self.mission_speed + late_s, max_m_s);
             a.distance_m(b) < 1.0 || !self.began_between(a, b) && !is_too_far()
         })
     }
@@ -147,6 +150,15 @@ mod tests {
         assert_eq!(legs(way().chain([20.5]).collect()), 2, "6 m in a second at 0.5 m/s");
         let unmeasured = way().chain(std::iter::repeat_n(14.5, 10)).chain([20.5]);
         assert_eq!(legs(unmeasured.collect()), 1, "6 m in the 11 s since its place was measured");
+    }
+
+    #[test]
+    fn a_late_report_is_no_jump() {
+        let mut vehicle = vehicle(&(0..30).map(|n| f64::from(n) * 0.5).chain([22.5]).collect::<Vec<_>>(), &[]);
+        vehicle.mission_speed = 1.0;
+        assert_eq!(vehicle.legs().count(), 2, "by its own record");
+        vehicle.track = std::mem::take(&mut vehicle.own.track);
+        assert_eq!((vehicle.legs().count(), vehicle.distance_m()), (1, 22.5), "8 m in a second, by reports");
     }
 
     #[test]

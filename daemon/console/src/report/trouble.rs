@@ -45,21 +45,26 @@ pub(super) fn told(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> 
         restart("the vehicle's", pause, told_of(set_back) + &uncertainty::lost(vehicle, pause))
     }));
     found.extend(gaps::told(dive, vehicle));
-    let refused = vehicle.orders_of_people().filter_map(|(order, way)| {
-        let last = way.last().filter(|last| last.status == OrderStatus::REFUSED)?;
-        let ordered = dive.ordered(state, vehicle, order).1;
-        Some((last.at_s, format!("the vehicle refused an order ({ordered}): {}", last.reason)))
-    });
-    found.extend(refused);
-    found.extend(dive.not_sent(state).map(|event| {
-        let (at_s, told) = told(event);
-        (at_s, format!("the surface refused a request: {told}"))
-    }));
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     match found.is_empty() {
         true => vec!["No fault, no restart and no silence was reported.".to_owned()],
         false => listed(&found),
     }
+}
+
+/// The orders that the vehicle refused, and the requests that the surface did.
+pub(super) fn refused(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
+    let by_vehicle = vehicle.orders_of_people().filter_map(|(order, way)| {
+        let last = way.last().filter(|last| last.status == OrderStatus::REFUSED)?;
+        let ordered = dive.ordered(state, vehicle, order).1;
+        Some((last.at_s, format!("the vehicle refused an order ({ordered}): {}", last.reason)))
+    });
+    let by_surface = dive.not_sent(state).map(|(at_s, event)| {
+        (*at_s, format!("the surface refused a request: {}", words::event(&state.label_book, event)))
+    });
+    let mut found: Vec<(f64, String)> = by_vehicle.chain(by_surface).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    listed(&found)
 }
 
 /// Whether an event is about a vehicle, or about all.

@@ -12,6 +12,8 @@ use serde_json::Value;
 
 /// A shorter jump is not told, metres.
 const LEAST_JUMP_M: f64 = 2.0;
+/// A vehicle that rises to the surface gets at least so much above its survey, metres.
+const RISEN_M: f64 = 0.5;
 /// Jumps that are told one by one.
 const MAX_JUMPS: usize = 4;
 
@@ -76,9 +78,14 @@ pub(super) fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) ->
         )
     });
     let (rising, deep): (Vec<f64>, Vec<f64>) = depths(dive, state, vehicle);
-    let depth = match (range(&deep), range(&rising)) {
-        (Some(deep), Some(rising)) => format!("at {deep} below the surface until it rose to it, and at {rising} then"),
-        (one, other) => format!("at {} below the surface", one.or(other).unwrap_or_default()),
+    let least = |depths: &[f64]| depths.iter().copied().fold(f64::INFINITY, f64::min);
+    let depth = match least(&rising) < least(&deep) - RISEN_M {
+        true => format!(
+            "at {} below the surface until it rose to it, and at {} then",
+            range(&deep).unwrap_or_default(),
+            range(&rising).unwrap_or_default()
+        ),
+        false => format!("at {} below the surface", range(&[deep, rising].concat()).unwrap_or_default()),
     };
     let (least, ended) = if has_own { ("at", "and ended") } else { ("at least", "the last one is") };
     let speed =
@@ -169,5 +176,9 @@ mod tests {
         dive.events = vec![(1.5, Event { source: "mode".to_owned(), text, ..Event::default() })];
         let told = super::place(&dive, &state, &vehicle);
         assert!(told.contains("at depths of 14.0 to 17.3 m below the surface until it rose to it, and at depths of 0.0 to 13.0 m then."), "{told}");
+        vehicle.track.pop();
+        vehicle.track[2].depth_m = 16.8;
+        let told = super::place(&dive, &state, &vehicle);
+        assert!(told.contains("at depths of 14.0 to 17.3 m below the surface."), "it stayed down: {told}");
     }
 }

@@ -75,13 +75,21 @@ fn labels_of(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> BTreeSet
     on_map.chain(book.keys().copied()).filter(|label| book.shown_as(*label) == class).collect()
 }
 
-/// The numbers of these labels, unless the class is one label alone.
+fn cells_of(vehicle: &DiveVehicle, label: u8) -> usize {
+    vehicle.map.labels.iter().filter(|(_, of)| *of == label).count()
+}
+
+/// These labels with their cells, unless the class is one label alone.
 pub(super) fn merged(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> String {
-    let labels: Vec<String> = labels_of(state, vehicle, class).iter().map(u8::to_string).collect();
+    let labels: Vec<u8> = labels_of(state, vehicle, class).into_iter().collect();
+    let with_cells = |label: &u8| match cells_of(vehicle, *label) {
+        0 => format!("label {label}: no cell"),
+        cells => format!("label {label}: {}", counted(cells, "cell", "cells")),
+    };
     match &labels[..] {
-        [only] if *only == class.to_string() => String::new(),
+        [only] if *only == class => String::new(),
         [only] => format!(" (label {only})"),
-        _ => format!(" (labels {})", labels.join(", ")),
+        _ => format!(" ({})", labels.iter().map(with_cells).collect::<Vec<_>>().join(", ")),
     }
 }
 
@@ -90,7 +98,8 @@ pub(super) fn class(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> S
     let others = labels_of(state, vehicle, class).into_iter().filter(|label| *label != class);
     let others: Vec<String> = others.map(|other| label(&state.label_book, other)).collect();
     let own = label(&state.label_book, class);
-    if others.is_empty() { own } else { format!("{own}, into which people merged {},", others.join(" and ")) }
+    let empty = if cells_of(vehicle, class) == 0 { "which has no cell of its own and " } else { "" };
+    if others.is_empty() { own } else { format!("{own}, {empty}into which people merged {},", others.join(" and ")) }
 }
 
 /// An event with reasons of modes in words, and labels with their names.
@@ -105,7 +114,7 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
         (": order", ": by order"),
         (NO_ORDER, ": it waited for an order to resume"),
         ("holding", ": it had reached the end of its plan"),
-        ("done", ": its survey had ended"),
+        ("done", ": its survey, or the recording that was played back, had ended"),
     ];
     let in_words = |(short, long): &(&str, &str)| match text.strip_suffix(short)? {
         "" => Some(format!("{short}{long}")),
@@ -212,7 +221,7 @@ pub(super) fn content(book: &LabelBook, order: &Order) -> String {
             let told = |area: &Value| format!("weight {} ({})", value_in_words(&area["weight"]), corners(area));
             let all: Vec<String> = areas.iter().map(told).collect();
             if all.is_empty() {
-                return Some("none any more".to_owned());
+                return Some("no weighted areas any more".to_owned());
             }
             Some(format!("{}: {}", counted(areas.len(), "area", "areas"), all.join("; ")))
         }
@@ -293,9 +302,9 @@ pub(super) fn of_intervals(classes: &[ClassArea]) -> &'static str {
         true => {
             "A class is a label of the scene model, with the labels that people merged into it: a group that the model found without being \
              taught, and that no person has verified. The intervals come from the \
-             model's own confidence in each cell, which is known to a quarter and taken as the probability that the cell's label is right. A \
+             model's own confidence in each cell, which comes in steps of a quarter and is taken as the probability that the cell's label is right. A \
              label that is wrong is taken to be one of the others, in proportion to their areas. Squares of 4 x 4 cells are taken to be right \
-             or wrong as a whole. Where no confidence arrived, all is taken to be possible. The intervals do not have the error of positions, \
+             or wrong as a whole. Where no confidence arrived, all is taken to be possible. The intervals do not include the error of positions, \
              sea floor that nobody has seen, or classes that the model does not tell apart."
         }
         false => {

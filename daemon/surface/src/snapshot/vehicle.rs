@@ -3,6 +3,7 @@
 use super::facts::MissionFacts;
 use super::{exemplar, facts, link};
 use crate::record::{StoredDraft, StoredMarker, StoredNote};
+use crate::reported_orders::why_refused;
 use crate::state::{
     AppliedOrder, DirectiveSlots, EarlierMap, FavouredTime, FloorSummary, InForceKnowledge, MapLabel, MapLabelTree,
     MapSummary, OrderProgress, OrderStatus, OtherSurface, PlanAims, PlannedPath, ReportedDisk, ReportedFault,
@@ -122,7 +123,7 @@ fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
             in_force: record.orders.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
         },
         in_force: REPORTED_SLOTS.map(|id| (id.name().to_owned(), knowledge(view.in_force(id)))).into(),
-        directive: DirectiveSlots { slots: view.slots().map(order_progress).collect() },
+        directive: DirectiveSlots { slots: view.slots().map(|slot| order_progress(slot, record)).collect() },
     }
 }
 
@@ -319,13 +320,13 @@ fn label(
     }
 }
 
-fn order_progress(s: &SlotProgress) -> OrderProgress {
+fn order_progress(s: &SlotProgress, record: &VehicleRecord) -> OrderProgress {
     let (state, reason) = match s.status {
         directive::OrderStatus::Queued => (OrderStatus::Queued, None),
         directive::OrderStatus::OnAir => (OrderStatus::OnAir, None),
         directive::OrderStatus::Received => (OrderStatus::Received, None),
         directive::OrderStatus::Applied => (OrderStatus::Applied, None),
-        directive::OrderStatus::Refused(reason) => (OrderStatus::Refused, Some(reason.explain().to_owned())),
+        directive::OrderStatus::Refused(reason) => (OrderStatus::Refused, Some(why_refused(record, &s.slot, reason))),
         directive::OrderStatus::Withdrawn(why) => (OrderStatus::Withdrawn, Some(why.explain().to_owned())),
     };
     let asks = matches!(s.status, directive::OrderStatus::Withdrawn(why) if why.asks());
