@@ -124,6 +124,10 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
     let text = match (source.as_str(), text.as_str()) {
         ("contact", ANOTHER_RUN) => "the vehicle's program had been restarted".to_owned(),
         ("contact", "received") => "the surface heard it".to_owned(),
+        // What an operator could do then is no part of a report.
+        ("refused", text) if text.contains(": request it, ") => {
+            text.split(": request it, ").next().unwrap_or_default().to_owned()
+        }
         ("answer", text) => text.split_once(' ').map_or_else(
             || text.to_owned(),
             |(slot, what)| {
@@ -404,6 +408,8 @@ mod tests {
         );
         assert_eq!(told("record", "label 3: name coral"), "label 3: name coral");
         assert_eq!(told("answer", "utility version 2 applied"), "weights applied");
+        let refused = "bob: hold: not sent: anna has had command for 5 s: request it, or take it after 1 min";
+        assert_eq!(told("refused", refused), "bob: hold: not sent: anna has had command for 5 s");
     }
 
     #[test]
