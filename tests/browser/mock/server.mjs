@@ -251,6 +251,7 @@ function steer(mock, order, res) {
   if ("registration" in order) mission.vehicles[0].registration = order.registration;
   if ("closed_loops" in order) mission.vehicles[0].closedLoops = order.closed_loops;
   if ("mismatch" in order) mission.vehicles[0].mismatch = order.mismatch;
+  if ("aims" in order) mission.vehicles[0].aims = order.aims;
   if ("favoured_time" in order) mission.vehicles[0].favouredTime = order.favoured_time;
   if ("other_surface" in order) mission.vehicles[0].otherSurface = order.other_surface;
   for (const [slot, reason] of Object.entries(order.withdraw ?? {})) mission.vehicles[0].directive.withdraw(slot, reason, mission.nowS);

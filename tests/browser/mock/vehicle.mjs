@@ -195,7 +195,7 @@ export class Vehicle {
     return {
       id: this.id, name: this.name, last_received_s: this.receivedS, expected_interval_s: this.turnS,
       next_contact_s: this.receivedS === null ? null : this.nextTurnS, other_surface: this.otherSurface ?? null, status: this.status, track: this.track,
-      favoured_time: this.favouredTime ?? null,
+      aims: this.aims ?? null, favoured_time: this.favouredTime ?? null,
       registration: this.registration ?? null, closed_loops: this.closedLoops ?? [],
       map: {
         version: this.replica.version, cell_m: this.replica.cellM, ...bounds,

@@ -64,6 +64,25 @@ export default [
     },
   },
   {
+    name: "the page says why the vehicle goes to other floor than a favoured label",
+    scenario: "rich",
+    async run(s) {
+      await firstLabels(s);
+      const question = s.page.getByRole("button", { name: "Why not to a favoured label first?" });
+      const aims = { legs: [], first: { reason: "unseen", label: null, at: [4, 0], along_m: 4, arrival_s: 60 }, targets: [] };
+      await s.steer({ aims });
+      assert.ok(!(await question.isVisible()), "no label is favoured");
+      await s.page.locator("#label-list input[type=range]").first().focus();
+      await s.page.keyboard.press("ArrowRight");
+      await s.page.locator("#send-weights").click();
+      await s.until("the weights are in force", () => question.isVisible(), { ms: 240000, advance: 2 });
+      await question.click();
+      await s.shows("#vehicle", /With these weights the vehicle would go to label/);
+      await s.steer({ aims: { ...aims, first: { ...aims.first, reason: "label", label: 1 } } });
+      await s.until("the question is gone", async () => !(await question.isVisible()));
+    },
+  },
+  {
     name: "the first mission follows the state, and stays closed once it is closed",
     long: true,
     scenario: "rich",

@@ -1,10 +1,11 @@
-// The button Try beside Send: asks the surface what the vehicle would do by the weights as they are set, and sends nothing.
+// What the surface plans with the vehicle's own planner and sends nothing: the button Try beside Send asks what the vehicle would do by
+// the weights as they are set, and the question below the vehicle's target why it does not go to a favoured label first.
 
 import { dryRun } from "../api.js";
 import { announce, h, show, text } from "../dom.js";
 import { dryRunOf, forgetDryRun, showDryRun } from "../map/dry-run.js";
 import { store } from "../store.js";
-import { utilityOf, weightsOrder } from "./weights.js";
+import { utilityOf, weightsInForce, weightsOrder } from "./weights.js";
 
 /** What the colours of a plan mean, in the order of the legend. */
 const REASONS = { label: "favoured label", expected: "label expected", unseen: "unseen floor", return: "return", other: "other" };
@@ -52,4 +53,26 @@ export function refreshTry(vehicle) {
   if (card.hidden) return forgetDryRun();
   text(words, run.text);
   text(rests, run.rests_on);
+}
+
+const answer = h("p.note", { role: "status" });
+const question = h("button.quiet", { type: "button", title: "Plan by the weights in force, and compare the way to the nearest known floor of a favoured label", onclick: explain }, "Why not to a favoured label first?");
+
+/** Stands below what the plan leads to. */
+export const whyPart = h("div", { hidden: true }, question, answer);
+
+async function explain() {
+  const { vehicle } = store;
+  try {
+    text(answer, (await dryRun(vehicle.id, weightsInForce(vehicle))).text);
+  } catch (error) {
+    text(answer, error.message);
+  }
+}
+
+/** Asks and answers only while the plan leads elsewhere than to a favoured label. */
+export function refreshWhy(vehicle) {
+  const isElsewhere = Boolean(vehicle.aims?.first) && vehicle.aims.first.reason !== "label";
+  show(whyPart, isElsewhere && !store.replay && vehicle.labels.some((label) => label.weight > 0));
+  if (whyPart.hidden) text(answer, "");
 }

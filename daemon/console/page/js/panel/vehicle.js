@@ -9,6 +9,7 @@ import { lengthOf, pathOf } from "../map/path.js";
 import { describe, nameOfStatus } from "../order/status.js";
 import { ageOf, isHeard, isStale, store } from "../store.js";
 import { refreshStop, stopParts } from "./stop.js";
+import { refreshWhy, whyPart } from "./try.js";
 
 const NAMES = { utility: "Weights", hold: "Hold", resume: "Resume", abort: "Abort", limits: "Limits", fence: "Fence", areas: "Areas", destination: "Destination", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
 const title = h("h2", { id: "vehicle-title" });
@@ -47,7 +48,7 @@ export function startVehicle() {
     node.classList.toggle("whole", WHOLE_LINES.includes(key));
     list.append(node);
   }
-  $("vehicle").append(h("header", {}, title, mode), age, list,
+  $("vehicle").append(h("header", {}, title, mode), age, list, whyPart,
     h("h3", {}, "Directive"), slots, noOrders, ...stopParts);
   store.on("state select tick feed edit", update);
 }
@@ -79,6 +80,7 @@ function update() {
   show(lines.arrival, arrival !== null);
   values.favoured(v.favoured_time ? favouredText(v.favoured_time) : "");
   show(lines.favoured, Boolean(v.favoured_time));
+  refreshWhy(v);
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
   values.disk(disk(s?.disk));

@@ -23,6 +23,9 @@ export function utilityOf(vehicle, value) {
   return { weights, ...Object.fromEntries(TERMS.map((term) => [term, value(term)])) };
 }
 
+/** The weights in force, as an order has them. */
+export const weightsInForce = (vehicle) => utilityOf(vehicle, (part) => read(vehicle, part));
+
 const post = (vehicle, value) => sendUtility(vehicle.id, utilityOf(vehicle, value));
 
 /** Whether the labels of a group have different weights, and none was set for the group. */
