@@ -36,12 +36,12 @@ pub(super) enum Reference {
 
 /// The pixels of a file: their size, the north-west corner of the first, and their number.
 #[derive(Debug, Clone, Copy)]
-struct Raster {
-    west: f64,
-    north: f64,
-    pixel: (f64, f64),
-    width: u32,
-    height: u32,
+pub(super) struct Raster {
+    pub(super) west: f64,
+    pub(super) north: f64,
+    pub(super) pixel: (f64, f64),
+    pub(super) width: u32,
+    pub(super) height: u32,
 }
 
 /// From the coordinates of a file to metres in the world frame, and back.
@@ -208,7 +208,7 @@ fn label(cells: &MapCells, x: f64, y: f64) -> Option<u8> {
 
 /// The geographic keys of a file: numbers, and the doubles that some of them refer to.
 #[derive(Default)]
-struct GeoKeys {
+pub(super) struct GeoKeys {
     shorts: Vec<(u16, u16)>,
     doubles: Vec<(u16, f64)>,
     /// The name of the projection, in ASCII; empty for one with a number.
@@ -253,7 +253,7 @@ fn wgs84_keys() -> GeoKeys {
     GeoKeys { shorts, ..GeoKeys::default() }
 }
 
-fn mission_keys(origin: Origin) -> GeoKeys {
+pub(super) fn mission_keys(origin: Origin) -> GeoKeys {
     let method =
         [(PROJECTED_CRS, USER_DEFINED), (PROJECTION, USER_DEFINED), (PROJECTION_METHOD, 1), (LINEAR_UNITS, METRE)];
     let place =
@@ -313,6 +313,14 @@ fn directory(cells: &MapCells, raster: &Raster, keys: &GeoKeys) -> Directory {
         let title = caption.title().replace(|c: char| !c.is_ascii(), "?");
         directory.text(IMAGE_DESCRIPTION, &format!("{title}, pixel value = label"));
     }
+    locate(&mut directory, raster, keys);
+    directory.text(GDAL_METADATA, &metadata(cells));
+    directory.text(GDAL_NODATA, "0");
+    directory
+}
+
+/// Where the pixels are.
+pub(super) fn locate(directory: &mut Directory, raster: &Raster, keys: &GeoKeys) {
     directory.doubles(PIXEL_SCALE, &[raster.pixel.0, raster.pixel.1, 0.0]);
     directory.doubles(TIE_POINT, &[0.0, 0.0, 0.0, raster.west, raster.north, 0.0]);
     if !keys.shorts.is_empty() {
@@ -324,9 +332,6 @@ fn directory(cells: &MapCells, raster: &Raster, keys: &GeoKeys) -> Directory {
     if !keys.citation.is_empty() {
         directory.text(GEO_TEXTS, &keys.citation);
     }
-    directory.text(GDAL_METADATA, &metadata(cells));
-    directory.text(GDAL_NODATA, "0");
-    directory
 }
 
 /// Vehicle, time and the name of each label, which GDAL shows as the metadata of the file.
@@ -339,7 +344,7 @@ fn metadata(cells: &MapCells) -> String {
     format!("<GDALMetadata>{}</GDALMetadata>", facts.chain(classes).collect::<String>())
 }
 
-fn deflate(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
+pub(super) fn deflate(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(bytes)?;
     encoder.finish()

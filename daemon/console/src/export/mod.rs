@@ -3,6 +3,7 @@
 mod annotations;
 mod cells;
 mod files;
+mod floor;
 mod geotiff;
 mod projection;
 mod regions;
@@ -16,6 +17,7 @@ use scenecast_surface::MapCells;
 pub(crate) use cells::map_body;
 pub use files::MapFormat;
 pub(crate) use files::harmless;
+pub(crate) use floor::{FloorPicture, floor_tiff};
 pub(crate) use projection::TransverseMercator;
 
 /// Why the map is not written in a format; as text one line for the operator.

@@ -1,4 +1,4 @@
-//! A TIFF of labels with its directory before its tiles, as readers by network want it (cloud-optimised).
+//! A TIFF with its directory before its tiles, as readers by network want it (cloud-optimised).
 //!
 //! Source: TIFF 6.0.
 
@@ -24,10 +24,13 @@ const BITS_PER_SAMPLE: u16 = 258;
 const COMPRESSION: u16 = 259;
 const ADOBE_DEFLATE: u16 = 8;
 const PHOTOMETRIC: u16 = 262;
+const RGB: u16 = 2;
 const PALETTE: u16 = 3;
 const SAMPLES_PER_PIXEL: u16 = 277;
 const PLANAR_CONFIGURATION: u16 = 284;
 const COLOUR_MAP: u16 = 320;
+const EXTRA_SAMPLES: u16 = 338;
+const UNASSOCIATED_ALPHA: u16 = 2;
 const TILE_WIDTH: u16 = 322;
 const TILE_LENGTH: u16 = 323;
 const TILE_OFFSETS: u16 = 324;
@@ -36,16 +39,29 @@ const TILE_BYTE_COUNTS: u16 = 325;
 const HEADER_BYTES: usize = 8;
 
 impl Directory {
-    /// One of pixels of a byte on a palette, in deflated tiles.
-    pub(super) fn of_labels([width, height]: [u32; 2], colour: impl Fn(u8) -> [u8; 3]) -> Self {
+    /// One of pixels of so many bytes, in deflated tiles.
+    fn new([width, height]: [u32; 2], samples: u16, photometric: u16) -> Self {
         let mut directory = Self::default();
         directory.longs(IMAGE_WIDTH, &[width]);
         directory.longs(IMAGE_LENGTH, &[height]);
-        directory.shorts(BITS_PER_SAMPLE, &[8]);
+        directory.shorts(BITS_PER_SAMPLE, &vec![8; samples.into()]);
         directory.shorts(COMPRESSION, &[ADOBE_DEFLATE]);
-        directory.shorts(PHOTOMETRIC, &[PALETTE]);
-        directory.shorts(SAMPLES_PER_PIXEL, &[1]);
+        directory.shorts(PHOTOMETRIC, &[photometric]);
+        directory.shorts(SAMPLES_PER_PIXEL, &[samples]);
         directory.shorts(PLANAR_CONFIGURATION, &[1]);
+        directory
+    }
+
+    /// One of red, green, blue and opacity.
+    pub(super) fn of_colours(size: [u32; 2]) -> Self {
+        let mut directory = Self::new(size, 4, RGB);
+        directory.shorts(EXTRA_SAMPLES, &[UNASSOCIATED_ALPHA]);
+        directory
+    }
+
+    /// One of labels on a palette.
+    pub(super) fn of_labels(size: [u32; 2], colour: impl Fn(u8) -> [u8; 3]) -> Self {
+        let mut directory = Self::new(size, 1, PALETTE);
         // All reds, then all greens, then all blues, in 16 bits each.
         let colours: Vec<[u8; 3]> = (0..=u8::MAX).map(colour).collect();
         let channel = |channel: usize| colours.iter().map(move |colour| u16::from(colour[channel]) * 257);

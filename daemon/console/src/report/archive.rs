@@ -4,10 +4,10 @@ use super::dive::{Dive, DiveVehicle};
 use super::order_step::OrderStep;
 use super::track_point::TrackPoint;
 use super::words;
-use crate::export::{MapFormat, harmless};
+use crate::export::{FloorPicture, MapFormat, floor_tiff, harmless};
 use scenecast_core::{UserError, utc_text};
 use scenecast_messages::contents::valid_part;
-use scenecast_messages::scenecast_msgs::Event;
+use scenecast_messages::scenecast_msgs::{Event, Exemplar};
 use scenecast_surface::state::VehicleState;
 use std::fmt::Display;
 use std::io::{Cursor, Write};
@@ -121,6 +121,15 @@ impl Dive {
             views.push(vec![name, taken, east, north, format!("{:.3}", view.width_m)]);
         }
         let header = ["file", "taken_utc", "east_on_map_m", "north_on_map_m", "width_m"];
-        archive.add_table(&format!("{folder}/floor.csv"), &header, views)
+        archive.add_table(&format!("{folder}/floor.csv"), &header, views)?;
+        let (east_m, north_m) = state.map.shift_m();
+        let picture = |view: &Exemplar| FloorPicture {
+            corner_m: (view.middle.x - view.width_m / 2.0 + east_m, view.middle.y + view.width_m / 2.0 + north_m),
+            edge_m: view.width_m,
+            webp: view.data.clone(),
+        };
+        let pictures: Vec<FloorPicture> = vehicle.floor.iter().map(picture).collect();
+        let floor = floor_tiff(&pictures, &cells, self.state.mission.origin).map_err(UserError::failed)?;
+        floor.map_or(Ok(()), |bytes| archive.add(&format!("{folder}/floor.tif"), &bytes))
     }
 }
