@@ -3,9 +3,12 @@
 use crate::sections::key::Key;
 use crate::{
     Authenticate, AutopilotKind, CalibrationSource, CameraSource, Config, DepthSource, HostPort, LabelMessage,
-    LabelSource, ModemKind, NavigationSource, RosName, S2cMode,
+    LabelSource, Modem, ModemKind, NavigationSource, RosName, S2cMode,
 };
-use scenecast_core::{MicromodemRate, PortAddress, S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES, UserError};
+use scenecast_core::{
+    FlowControl, MicromodemRate, PortAddress, S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES, SerialFormat, SerialLine,
+    UserError,
+};
 
 /// The longest time on air of a frame, seconds.
 const MAX_FRAME_S: f64 = 55.0;
@@ -264,6 +267,7 @@ pub fn full_frame_bytes(config: &Config) -> usize {
 /// A line that names the key and the allowed values.
 fn check_modem(config: &Config) -> Result<(), UserError> {
     let m = &config.modem;
+    check_line(m)?;
     let (highest, limit) = match m.kind {
         ModemKind::S2c => (m.highest_address, "modem.highest_address"),
         ModemKind::Micromodem => (MICROMODEM_HIGHEST, "a Micromodem's highest address"),
@@ -288,6 +292,21 @@ fn check_modem(config: &Config) -> Result<(), UserError> {
     Ok(())
 }
 
+/// The bytes of frames have all values; only a Micromodem gets them as text.
+fn check_line(m: &Modem) -> Result<(), UserError> {
+    let seven_bits = matches!(m.serial_format, SerialFormat::SevenEvenOne | SerialFormat::SevenOddOne);
+    let given = match (seven_bits, m.flow_control) {
+        _ if m.kind == ModemKind::Micromodem => return Ok(()),
+        (true, _) => format!("modem.serial_format = \"{}\"", m.serial_format.name()),
+        (_, FlowControl::Software) => "modem.flow_control = \"software\"".to_owned(),
+        _ => return Ok(()),
+    };
+    let kind = m.kind;
+    Err(UserError::Input(format!(
+        "{given} is not allowed with modem.kind = \"{kind}\", whose data has bytes of all values; allowed with micromodem"
+    )))
+}
+
 /// The port of the modem.
 ///
 /// # Errors
@@ -304,7 +323,9 @@ pub fn modem_port(config: &Config) -> Result<PortAddress, UserError> {
         (ModemKind::Tcp, _, Some(listen), None) => Ok(PortAddress::Listen(listen.to_string())),
         (ModemKind::Tcp, _, None, Some(connect)) => Ok(PortAddress::Connect(connect.to_string())),
         (_, Some(device), ..) if kind != ModemKind::Tcp => {
-            Ok(PortAddress::Serial(device.display().to_string(), m.baud))
+            let line =
+                SerialLine { baud: m.baud, format: m.serial_format, flow: m.flow_control, rts: m.rts, dtr: m.dtr };
+            Ok(PortAddress::Serial(device.display().to_string(), line))
         }
         (_, _, None, None) => missing("modem.device (a serial device) or modem.connect (HOST:PORT)"),
         (_, _, Some(listen), None) => Ok(PortAddress::Listen(listen.to_string())),
@@ -317,6 +338,17 @@ pub fn modem_port(config: &Config) -> Result<PortAddress, UserError> {
 
 #[cfg(test)]
 mod tests {
+
+    #[test]
+    fn a_serial_line_passes_all_bytes_of_frames() {
+        let load = |sets: &[&str]| crate::load(None, &sets.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>());
+        for set in ["modem.serial_format=7E1", "modem.flow_control=software"] {
+            let refused = load(&["modem.kind=s2c", set]).unwrap_err().to_string();
+            assert!(refused.contains(&set.replace('=', " = \"")) && refused.contains("micromodem"), "{refused}");
+            assert!(load(&["modem.kind=micromodem", set]).is_ok());
+        }
+        assert!(load(&["modem.kind=transparent", "modem.serial_format=8E1", "modem.flow_control=hardware"]).is_ok());
+    }
 
     #[test]
     fn an_autopilot_needs_a_port_of_its_kind() {

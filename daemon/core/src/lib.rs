@@ -11,6 +11,7 @@ mod modem_facts;
 pub mod nmea;
 mod output;
 pub mod palette;
+mod port_address;
 mod principal;
 mod program;
 pub mod tuning_table;
@@ -23,10 +24,9 @@ pub use geodesy::{
 };
 pub use label_picture::{WGS84_AUX_XML, world_file};
 pub use lines::Lines;
-pub use modem_facts::{
-    CYCLE_INIT, MicromodemRate, OVERHEAD_BITS, PortAddress, S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES,
-};
+pub use modem_facts::{CYCLE_INIT, MicromodemRate, OVERHEAD_BITS, S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES};
 pub use output::{Takes, UserError, one_line, printable, write_error, write_or_exit};
+pub use port_address::{FlowControl, PortAddress, SerialFormat, SerialLine};
 pub use principal::{ClientName, Giver, Principal, Role};
 pub use program::{program, set_program};
 pub use utc::utc_text;

@@ -4,7 +4,7 @@ use crate::clock::Clock;
 use crate::modem::{advice, not_there};
 use crate::port::{FromPort, Opened, Port, open};
 use scenecast_config::{Config, ModemKind};
-use scenecast_core::{PortAddress, UserError, outln};
+use scenecast_core::{PortAddress, SerialLine, UserError, outln};
 use scenecast_drivers::modem::{Driver, Event, PortFinding, PortListener, Speaker, driver, modem_of_process};
 use scenecast_protocol::wire::Address;
 use std::io;
@@ -71,9 +71,9 @@ async fn check(config: &Config, end: Address) -> Result<(), UserError> {
         })),
         Heard::Wrong(finding) => Err(UserError::Failed(match (&place, &finding) {
             (
-                PortAddress::Serial(device, baud),
+                PortAddress::Serial(device, line),
                 PortFinding::Silent | PortFinding::NoText | PortFinding::UnknownText(_),
-            ) => other_speed(device, *baud, config.modem.kind)
+            ) => other_speed(device, *line, config.modem.kind)
                 .await
                 .unwrap_or_else(|| format!("{}; no modem answers at other speeds either", advice(&finding, &place))),
             _ => advice(&finding, &place),
@@ -132,10 +132,10 @@ async fn listen(port: &mut Port, kind: ModemKind, driver: &mut dyn Driver) -> (H
 }
 
 /// Asks at the other usual speeds; the modem that answers, in a line for people.
-async fn other_speed(device: &str, configured: u32, kind: ModemKind) -> Option<String> {
-    for baud in BAUDS.into_iter().filter(|baud| *baud != configured) {
+async fn other_speed(device: &str, configured: SerialLine, kind: ModemKind) -> Option<String> {
+    for baud in BAUDS.into_iter().filter(|baud| *baud != configured.baud) {
         outln!("asking at {baud} bit/s");
-        let place = PortAddress::Serial(device.to_owned(), baud);
+        let place = PortAddress::Serial(device.to_owned(), SerialLine { baud, ..configured });
         let speaker = match ask(&place, kind).await {
             Ok(Some(speaker)) => speaker,
             Ok(None) => continue,

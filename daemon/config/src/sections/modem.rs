@@ -3,6 +3,7 @@
 use super::key::section;
 use crate::rule::{ANY, range};
 use crate::setting::{Authenticate, HostPort, ModemKind, S2cMode};
+use scenecast_core::{FlowControl, SerialFormat};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use std::path::PathBuf;
 
@@ -18,6 +19,15 @@ section! {
         device: Option<PathBuf> = None, ANY, [Auv Asv];
         /// Speed of the serial device.
         baud: u32 = 19_200, range(300.0, 4_000_000.0, "bit/s"), [Auv Asv Scenario];
+        /// Data bits, parity and stop bits of the serial device.
+        serial_format: SerialFormat = SerialFormat::EightNoneOne, ANY, [Auv Asv];
+        /// How the serial device and the modem stop each other from sending. hardware: by the lines RTS and CTS; software: by the
+        /// bytes XON and XOFF, which only a modem whose data never has these bytes can use.
+        flow_control: FlowControl = FlowControl::None, ANY, [Auv Asv];
+        /// Whether the line RTS of the serial device is up, where flow control does not use it. Some modems garble their output while it is.
+        rts: bool = false, ANY, [Auv Asv];
+        /// Whether the line DTR of the serial device is up. Some adapters and modems restart or sleep when it changes.
+        dtr: bool = true, ANY, [Auv Asv];
         /// Address and port to listen on, or to receive datagrams at. Without modem.connect, the sender of the first
         /// datagram that the link accepts is the other end, until 10 s pass without another one.
         listen: Option<HostPort> = None, ANY, [Auv Asv];

@@ -2,6 +2,7 @@
 
 use super::{Setting, one_of};
 use crate::rule::Rule;
+use scenecast_core::{FlowControl, SerialFormat};
 use scenecast_protocol::directive::{AtEnd, CellBand, PlannerKind, Reaction};
 use scenecast_protocol::map_codec::Codec;
 use strum::{Display, IntoStaticStr, VariantArray};
@@ -66,6 +67,22 @@ impl Choice for AtEnd {
 }
 
 impl Choice for Reaction {
+    const CHOICES: &'static [Self] = &Self::ALL;
+
+    fn word(self) -> &'static str {
+        self.name()
+    }
+}
+
+impl Choice for SerialFormat {
+    const CHOICES: &'static [Self] = &Self::ALL;
+
+    fn word(self) -> &'static str {
+        self.name()
+    }
+}
+
+impl Choice for FlowControl {
     const CHOICES: &'static [Self] = &Self::ALL;
 
     fn word(self) -> &'static str {

@@ -2,8 +2,8 @@
 
 use super::{Setting, different, read_different};
 use crate::rule::Rule;
-use scenecast_core::PortAddress;
 use scenecast_core::gps::GpsLanguage;
+use scenecast_core::{PortAddress, SerialLine};
 use serde_json::json;
 use std::fmt;
 use std::path::PathBuf;
@@ -133,7 +133,8 @@ fn parse(text: &str, kinds: &[&str]) -> Option<PortAddress> {
     Some(match kind {
         "serial" => {
             let (device, baud) = rest.rsplit_once(':')?;
-            PortAddress::Serial(device.to_owned(), baud.parse().ok().filter(|b| BAUD.contains(b))?)
+            let baud = baud.parse().ok().filter(|b| BAUD.contains(b))?;
+            PortAddress::Serial(device.to_owned(), SerialLine::of_speed(baud))
         }
         "udp" => PortAddress::Datagrams(host_port()?, String::new()),
         "udp-to" => PortAddress::Datagrams(String::new(), host_port()?),
@@ -163,7 +164,7 @@ fn schema(rule: &Rule) -> serde_json::Value {
 /// The text of a port that was read with the prefix `connect` for connections.
 fn text(address: &PortAddress, connect: &str) -> String {
     match address {
-        PortAddress::Serial(device, baud) => format!("serial:{device}:{baud}"),
+        PortAddress::Serial(device, line) => format!("serial:{device}:{}", line.baud),
         PortAddress::Listen(address) | PortAddress::Connect(address) => format!("{connect}:{address}"),
         PortAddress::Datagrams(own, remote) if remote.is_empty() => format!("udp:{own}"),
         PortAddress::Datagrams(_, remote) => format!("udp-to:{remote}"),
@@ -216,7 +217,10 @@ mod tests {
     fn ports_are_read_and_wrong_ones_refused() {
         let kinds = ["serial", "tcp", "gpsd"];
         let read = |text| parse(text, &kinds);
-        assert_eq!(read("serial:/dev/ttyUSB0:4800").unwrap(), PortAddress::Serial("/dev/ttyUSB0".to_owned(), 4800));
+        assert_eq!(
+            read("serial:/dev/ttyUSB0:4800").unwrap(),
+            PortAddress::Serial("/dev/ttyUSB0".to_owned(), SerialLine::of_speed(4800))
+        );
         assert_eq!(read("gpsd:localhost:2947").unwrap(), PortAddress::Connect("localhost:2947".to_owned()));
         for wrong in ["", "gpsd", "tcp:", "tcp:host", "tcp:host:99999", "serial:/dev/x", "serial:/dev/x:1", "udp:a:1"] {
             assert_eq!(read(wrong), None, "{wrong}");

@@ -3,7 +3,7 @@
 use super::carry::{PortActivity, append, carry};
 use super::udp::{self, PeerRule, UdpPeer};
 use super::{FromPort, PortEnds, tcp};
-use scenecast_core::PortAddress;
+use scenecast_core::{FlowControl, PortAddress, SerialFormat, SerialLine};
 use std::fs::File;
 use std::io;
 use std::time::Duration;
@@ -29,7 +29,7 @@ pub(crate) enum Opened {
 
 pub(crate) async fn open(place: &PortAddress) -> io::Result<Opened> {
     Ok(match place {
-        PortAddress::Serial(device, baud) => Opened::Serial(serial(device, *baud)?),
+        PortAddress::Serial(device, line) => Opened::Serial(serial(device, line)?),
         PortAddress::Listen(address) => Opened::Listener(TcpListener::bind(address).await?),
         PortAddress::Connect(address) => {
             let connection = tokio::time::timeout(CONNECT_TIMEOUT, TcpStream::connect(address)).await;
@@ -43,12 +43,30 @@ pub(crate) async fn open(place: &PortAddress) -> io::Result<Opened> {
     })
 }
 
-fn serial(device: &str, baud: u32) -> io::Result<SerialStream> {
-    let mut stream = tokio_serial::new(device, baud).open_native_async()?;
+fn serial(device: &str, line: &SerialLine) -> io::Result<SerialStream> {
+    use tokio_serial::{DataBits, FlowControl as Flow, Parity, StopBits};
+    let (data_bits, parity, stop_bits) = match line.format {
+        SerialFormat::EightNoneOne => (DataBits::Eight, Parity::None, StopBits::One),
+        SerialFormat::EightNoneTwo => (DataBits::Eight, Parity::None, StopBits::Two),
+        SerialFormat::EightEvenOne => (DataBits::Eight, Parity::Even, StopBits::One),
+        SerialFormat::EightOddOne => (DataBits::Eight, Parity::Odd, StopBits::One),
+        SerialFormat::SevenEvenOne => (DataBits::Seven, Parity::Even, StopBits::One),
+        SerialFormat::SevenOddOne => (DataBits::Seven, Parity::Odd, StopBits::One),
+    };
+    let flow = match line.flow {
+        FlowControl::None => Flow::None,
+        FlowControl::Hardware => Flow::Hardware,
+        FlowControl::Software => Flow::Software,
+    };
+    let port = tokio_serial::new(device, line.baud).data_bits(data_bits).parity(parity).stop_bits(stop_bits);
+    let mut stream = port.flow_control(flow).open_native_async()?;
     // Two ends may share a pseudo-terminal in a rehearsal; a system without exclusive access needs none.
     let _ = stream.set_exclusive(false);
-    // Some modems garble their output while RTS is up and flow control off; a pseudo-terminal has no such line.
-    let _ = stream.write_request_to_send(false);
+    // A pseudo-terminal has no such lines.
+    let _ = stream.write_data_terminal_ready(line.dtr);
+    if line.flow != FlowControl::Hardware {
+        let _ = stream.write_request_to_send(line.rts);
+    }
     Ok(stream)
 }
 
@@ -126,5 +144,29 @@ impl PortKeeper {
             return Ok(());
         }
         result
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use tokio_serial::StopBits;
+
+    #[tokio::test]
+    async fn a_serial_device_is_set_as_its_line_says() {
+        // A pseudo-terminal takes stop bits and flow control; it has eight bits without parity whatever is asked.
+        let (_other, device) = SerialStream::pair().unwrap();
+        let name = device.name().unwrap();
+        let line = |format, flow| SerialLine { format, flow, ..SerialLine::of_speed(9600) };
+        for (format, flow, stop_bits, expected) in [
+            (SerialFormat::EightNoneTwo, FlowControl::Software, StopBits::Two, tokio_serial::FlowControl::Software),
+            (SerialFormat::EightNoneOne, FlowControl::Hardware, StopBits::One, tokio_serial::FlowControl::Hardware),
+        ] {
+            let Opened::Serial(stream) = open(&PortAddress::Serial(name.clone(), line(format, flow))).await.unwrap()
+            else {
+                panic!("a serial device")
+            };
+            assert_eq!((stream.stop_bits().unwrap(), stream.flow_control().unwrap()), (stop_bits, expected));
+        }
     }
 }
