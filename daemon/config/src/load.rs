@@ -12,6 +12,8 @@ use toml::{Spanned, Table, Value};
 struct Given {
     key: String,
     value: Value,
+    /// The text of a value of the command line: a word such as 7E1 reads as a number.
+    word: Option<String>,
     place: String,
 }
 
@@ -51,7 +53,7 @@ fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), User
             let mut push = |key: String, at: usize, value| {
                 let place = place(at);
                 let value = plain(value).ok_or_else(|| UserError::Input(format!("{place}: {key} cannot be read")))?;
-                given.push(Given { key, value, place });
+                given.push(Given { key, value, word: None, place });
                 Ok(())
             };
             match value.get_ref() {
@@ -94,16 +96,17 @@ fn read_set(set: &str) -> Result<Given, UserError> {
         .ok_or_else(|| UserError::Input(format!("--set {set}: expected KEY=VALUE, as in link.budget_bps=2000")))?;
     let parsed = format!("v = {text}").parse::<Table>().ok().and_then(|mut t| t.remove("v"));
     let value = parsed.unwrap_or_else(|| Value::String(text.to_owned()));
-    Ok(Given { key: key.trim().to_owned(), value, place: format!("--set {set}") })
+    Ok(Given { key: key.trim().to_owned(), value, word: Some(text.to_owned()), place: format!("--set {set}") })
 }
 
 fn apply(config: &mut Config, given: &Given) -> Result<(), UserError> {
-    let Given { key: name, value, place } = given;
+    let Given { key: name, value, word, place } = given;
     let Some((key, member)) = find(name) else { return Err(unknown(name, place)) };
     let members = (key.operations.members)();
     if let (None, false, Value::Table(table)) = (member, members.is_empty(), value) {
         return table.iter().try_for_each(|(member, value)| {
-            let member = Given { key: format!("{name}.{member}"), value: value.clone(), place: place.clone() };
+            let (key, value) = (format!("{name}.{member}"), value.clone());
+            let member = Given { key, value, word: None, place: place.clone() };
             apply(config, &member)
         });
     }
@@ -111,11 +114,13 @@ fn apply(config: &mut Config, given: &Given) -> Result<(), UserError> {
         let takes = format!("{} has {}", key.name, members.join(", "));
         return Err(UserError::Input(format!("{place}: {} has no member {member}; {takes}", key.name)));
     }
-    (key.operations.set)(config, member, value, &key.rule).ok_or_else(|| refused(key, given))
+    let mut set = |value: &Value| (key.operations.set)(config, member, value, &key.rule);
+    let as_word = |word: &String| Value::String(word.clone());
+    set(value).or_else(|| set(&as_word(word.as_ref()?))).ok_or_else(|| refused(key, given))
 }
 
 fn refused(key: &Key, given: &Given) -> UserError {
-    let Given { key: name, value, place } = given;
+    let Given { key: name, value, place, .. } = given;
     UserError::Input(format!("{place}: {name} = {value} is not allowed; allowed: {}", key.allowed()))
 }
 
