@@ -404,11 +404,11 @@ fn command_passes_from_one_operator_to_another_in_a_shell() {
     refused("victor", &["note", "hello"], &["needs the role operator"]);
     let log = ok("anna", &["log", "--kind", "refused"]);
     assert!(log.contains("budget: 800 bit/s: not sent: anna has had command"), "{log}");
+    assert!(log.contains("orders the vehicle to hold, to abort, or to resume its survey {\"action\""), "{log}");
     assert!(
-        log.contains("orders the vehicle to hold, to abort, or to resume its survey: not sent: this needs"),
+        log.contains("adds a note about the vehicle {\"text\":\"hello\"}: not sent: this needs the role operator"),
         "{log}"
     );
-    assert!(log.contains("adds a note about the vehicle: not sent: this needs the role operator"), "{log}");
     ok("bob", &["hold"]);
     let abort = r#"{"action": "abort"}"#;
     assert_eq!(http(port, "POST", "/api/v2/vehicles/1/constraints", &headers[1], abort).unwrap().0, 202);

@@ -17,6 +17,8 @@ use std::time::Duration;
 
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
                       connect-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
+/// The longest body of a refused request that the log has, bytes.
+const MAX_LOGGED_BODY: usize = 256;
 /// From the head of a request to the head of its response.
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
 
@@ -81,7 +83,7 @@ pub(super) struct Need {
     pub(super) is_logged: bool,
 }
 
-/// Refuses principals below a role, before the body of the request is read.
+/// Refuses principals below a role. The log has what they asked for, if it is short.
 pub(super) async fn require_role(
     State((need, shared)): State<(Need, Shared)>,
     by: Option<Extension<Giver>>,
@@ -91,12 +93,15 @@ pub(super) async fn require_role(
     match by {
         Some(Extension(by)) if by.role() >= need.role => next.run(request).await,
         Some(Extension(by)) => {
+            let (parts, body) = request.into_parts();
             let line = format!("this needs the role {}; the role of {} is {}", need.role, by.name(), by.role());
             if need.is_logged {
-                let mut parts = request.uri().path().split('/').skip_while(|part| *part != "vehicles");
-                let vehicle = parts.nth(1).and_then(|id| id.parse().ok());
+                let mut path = parts.uri.path().split('/').skip_while(|part| *part != "vehicles");
+                let vehicle = path.nth(1).and_then(|id| id.parse().ok());
                 let what = need.what.split(['.', ';']).next().unwrap_or_default();
-                let what = format!("{}{}: not sent: {line}", what[..1].to_lowercase(), &what[1..]);
+                let asked = axum::body::to_bytes(body, MAX_LOGGED_BODY).await.unwrap_or_default();
+                let asked = String::from_utf8_lossy(&asked).replace(char::is_control, " ");
+                let what = format!("{}{} {asked}: not sent: {line}", what[..1].to_lowercase(), &what[1..]);
                 shared.note(by, SurfaceRequest::Barred(vehicle, what));
             }
             error(StatusCode::FORBIDDEN, &line)

@@ -347,7 +347,7 @@ fn changes() -> Vec<Operation> {
         change(
             "/api/v2/vehicles/{id}/labels",
             "set_label",
-            "Sets name, colour and merging of a label in the current epoch; they stay at the surface",
+            "Sets name, colour and merging of a label of the current map; they stay at the surface",
             schema::<LabelOrder>,
             || orders::to_vehicle(SurfaceRequest::Label),
         ),

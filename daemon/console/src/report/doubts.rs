@@ -84,8 +84,8 @@ fn relabelled(dive: &Dive, state: &VehicleState) -> Option<String> {
     });
     let before = match shares.len() {
         1 => String::new(),
-        2 => " The map had been corrected so once before.".to_owned(),
-        n => format!(" The map had been corrected so {} times before.", n - 1),
+        2 => " The map had been corrected in this way once before.".to_owned(),
+        n => format!(" The map had been corrected in this way {} times before.", n - 1),
     };
     let doubtful = if named.count() > 0 { "names given and images sent" } else { "images sent and weights ordered" };
     Some(format!(
@@ -124,7 +124,7 @@ fn place(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Option<Str
     };
     Some(format!(
         "Between {} and {}, for {} in all, the uncertainty of its place on the earth (68 %, east and north each) was {DOUBTFUL_M} m or more, \
-         {most_m:.0} m at most: what was mapped then may lie so far {off}.",
+         {most_m:.0} m at most: what was mapped then may lie that far {off}.",
         utc_text(first.at_s),
         utc_text(last.at_s),
         dive.lasted(time_s)

@@ -343,10 +343,11 @@ impl Way<'_> {
         let first = self.places().next()?;
         let farthest_m = self.places().map(|point| first.distance_m(point)).fold(0.0, f64::max);
         let (east, north) = (words::east(first.east_m), words::north(first.north_m));
+        let least = if self.vehicle.has_own_path() { "up to" } else { "at least" };
         Some(match farthest_m < STANDS_M {
             true => format!("it stood at {east}, {north}, at most {farthest_m:.1} m from there"),
             false => format!(
-                "it did not stand still: it was up to {farthest_m:.1} m away from {east}, {north}, where it was then"
+                "it did not stand still: it was {least} {farthest_m:.1} m away from {east}, {north}, where it was then"
             ),
         })
     }
@@ -444,7 +445,7 @@ mod tests {
         assert!(page.contains("where it does not allow, for 4 s in all"), "{page}");
         let page = told(&[("constraints", 10, r#"{"hold": true, "abort": false}"#)]);
         assert!(
-            page.contains("it did not stand still: it was up to 10.0 m away from 10.0 m east, 0.5 m north"),
+            page.contains("it did not stand still: it was at least 10.0 m away from 10.0 m east, 0.5 m north"),
             "{page}"
         );
         let page = told(&[("constraints", 20, r#"{"hold": true, "abort": false}"#)]);

@@ -83,7 +83,7 @@ fn age(dive: &Dive, times_s: &[f64], end_s: f64) -> String {
         0 => "no frame was heard.".to_owned(),
         1 => "one frame was heard.".to_owned(),
         _ => format!(
-            "half of the time, the last frame was heard at most {} before.",
+            "half of the time, the last frame was heard at most {} earlier.",
             dive.lasted_tenths(half_of_time_s(times_s, end_s))
         ),
     }
@@ -136,7 +136,7 @@ pub(super) fn of_records(dive: &Dive, vehicle: &DiveVehicle) -> Vec<String> {
         )
     });
     let unknown = vehicle.own.runs_s.is_empty().then(|| {
-        "What went on on board between the frames that were heard is known only as far as the surface learned of it: the vehicle's own record \
+        "What happened on board between the frames that were heard is known only as far as the surface learned of it: the vehicle's own record \
          is not among these."
             .to_owned()
     });
@@ -173,7 +173,7 @@ mod tests {
         let at_surface = "the surface heard nothing from it until 1970-01-01T00:01:00Z, for 30 s (60 s of the mission)";
         assert_eq!(told(&dive, &vehicle), [(30.0, at_surface.to_owned())]);
         let age =
-            "At the surface, half of the time, the last frame was heard at most 0.7 s (1.4 s of the mission) before.";
+            "At the surface, half of the time, the last frame was heard at most 0.7 s (1.4 s of the mission) earlier.";
         assert_eq!(heard(&dive, &vehicle)[1], age);
         vehicle.own.runs_s = vec![(0.0, 100.0)];
         vehicle.own.heard_s = (0..=100).filter(|s| !(26..62).contains(s)).map(f64::from).collect();

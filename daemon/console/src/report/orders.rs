@@ -169,7 +169,7 @@ impl Dive {
         if vehicle.orders_of_people().next().is_none() {
             return;
         }
-        *page += "<h3>Orders</h3>\n<table class=\"wide\"><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>decided on board after</th><th>known at the surface after</th></tr></thead>\n";
+        *page += "<h3>Orders</h3>\n<p>Labels have the names that they had at the end.</p>\n<table class=\"wide\"><thead><tr><th>order</th><th>what was ordered</th><th>by</th><th>given (UTC)</th><th>outcome</th><th>decided on board after</th><th>known at the surface after</th></tr></thead>\n";
         let mut orders: Vec<(&OrderKey, &OrderStep)> =
             vehicle.orders_of_people().filter_map(|(order, way)| Some((order, way.last()?))).collect();
         orders.sort_by(|a, b| a.1.given_s.total_cmp(&b.1.given_s));

@@ -10,7 +10,7 @@ use scenecast_messages::scenecast_msgs::OrderStatus;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{Cell, UNEXPLORED};
 use scenecast_protocol::wire::VehicleMode;
-use scenecast_surface::state::VehicleState;
+use scenecast_surface::state::{PrincipalRole, VehicleState};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -127,14 +127,28 @@ fn when(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> String {
         )
     });
     format!(
-        "The record of {} (address {}) covers {} to {}{ends}, {}{speed}; the vehicle reported its place {}.",
+        "{} {} (address {}) cover {} to {}{ends}, {}{speed}; the vehicle reported its place {}.{}",
+        if vehicle.own.runs_s.is_empty() { "The surface's records of" } else { "The records of the surface and of" },
         state.name,
         state.id,
         utc_text(begin),
         utc_text(end),
         dive.lasted(end - begin),
-        counted(vehicle.track.len(), "time", "times")
+        counted(vehicle.track.len(), "time", "times"),
+        people(dive)
     )
+}
+
+/// Who had access at the surface, where people had names there.
+fn people(dive: &Dive) -> String {
+    let role = |role: PrincipalRole| match role {
+        PrincipalRole::Viewer => "viewer",
+        PrincipalRole::Operator => "operator",
+        PrincipalRole::Administrator => "administrator",
+    };
+    let named = dive.state.command.principals.iter().filter(|principal| principal.name != "local");
+    let all: Vec<String> = named.map(|principal| format!("{} ({})", principal.name, role(principal.role))).collect();
+    if all.is_empty() { String::new() } else { format!(" People with access at the surface: {}.", all.join(", ")) }
 }
 
 /// How much of the vehicle's map has arrived; `alone`: cells without a neighbour, if every fourth one was sent.

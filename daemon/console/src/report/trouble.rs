@@ -79,20 +79,30 @@ impl Dive {
     }
 }
 
-/// The modes in which it did not survey, by order or because of a limit, how long it was in each, and what became of its images.
+/// The modes in which it did not survey, where it was when each began, how long it was in each, and what became of its images.
 pub(super) fn modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
-    let limited = dive.modes(state, vehicle).filter(|(_, event)| is_limited(&event.text));
-    let limited =
-        limited.map(|(at_s, event)| format!("{}, {}", utc_text(at_s), words::event(&state.label_book, event)));
-    let limited: Vec<String> = limited.take(MAX_TOLD).collect();
+    let all: Vec<(f64, &Event)> = dive.modes(state, vehicle).collect();
+    let others = all.iter().enumerate().filter(|(_, (_, event))| !is_survey(&event.text));
+    let limited: Vec<String> = others
+        .map(|(n, (at_s, event))| {
+            let until = all.get(n + 1).map_or_else(|| "the end".to_owned(), |(next_s, _)| utc_text(*next_s));
+            let place = vehicle.path().iter().rev().find(|point| point.at_s <= at_s + 1.0);
+            let place = place.map_or_else(String::new, |point| {
+                format!(" (from {}, {})", words::east(point.east_m), words::north(point.north_m))
+            });
+            format!("{} to {until}, {}{place}", utc_text(*at_s), words::event(&state.label_book, event))
+        })
+        .take(MAX_TOLD)
+        .collect();
     let title = match vehicle.own.runs_s.is_empty() {
         true => "Why it did not survey, when the surface learned of it",
         false => "Why it did not survey",
     };
     let limited = (!limited.is_empty()).then(|| format!("{title}: {}.", limited.join("; ")));
+    let ended = all.last().filter(|(_, event)| is_survey(&event.text)).map(|_| "It surveyed until the end.".to_owned());
     let images = (!vehicle.own.images.is_empty())
         .then(|| format!("Images by the vehicle's own record: {}.", vehicle.own.images.join(". After a restart: ")));
-    limited.into_iter().chain(times_of_modes(dive, state, vehicle)).chain(images).collect()
+    limited.into_iter().chain(ended).chain(times_of_modes(dive, state, vehicle)).chain(images).collect()
 }
 
 /// The faults that a text of the log names, and whether the survey does not proceed as planned with each; `None` if it is about
@@ -153,16 +163,20 @@ fn times_of_modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> O
     (told.len() > 1).then(|| format!("Time in each mode by its own record: {}.", told.join(", ")))
 }
 
+fn is_survey(mode: &str) -> bool {
+    mode.starts_with(VehicleMode::Survey.name())
+}
+
 /// Whether a mode is the survey or its end, or one that was ordered or that a limit led to.
 fn is_planned(mode: &str) -> bool {
-    mode.starts_with(VehicleMode::Survey.name()) || is_limited(mode)
+    is_survey(mode) || is_limited(mode)
 }
 
 /// Whether an order, or the want of one, a limit of distance or time, or the end of its plan led to a mode other than the survey.
 fn is_limited(mode: &str) -> bool {
     let troubles = [ModeReason::Silence, ModeReason::Fence, ModeReason::Band, ModeReason::NoPath];
     let is_of = |reason: &ModeReason| mode.rsplit_once(": ").is_some_and(|(_, end)| Some(end) == reason.name());
-    !mode.starts_with(VehicleMode::Survey.name()) && !troubles.iter().any(is_of)
+    !is_survey(mode) && !troubles.iter().any(is_of)
 }
 
 /// Each of these events in a sentence; of many, the first.

@@ -47,8 +47,8 @@ pub(super) fn label(book: &LabelBook, label: u8) -> String {
 pub(super) fn unused(frames: &FrameCounts) -> String {
     let causes = frames.dropped.iter().map(|(reason, count)| match reason.as_str() {
         "duplicate" => counted(*count as usize, "copy of a known frame", "copies of known frames"),
-        "checksum" => format!("{count} that were damaged, of another run or of another mission"),
-        "truncated" => format!("{count} that were cut short"),
+        "checksum" => format!("{count} damaged, of another run or of another mission"),
+        "truncated" => format!("{count} cut short"),
         other => format!("{count} refused ({})", other.replace('_', " ")),
     });
     match frames.unused() {
@@ -113,7 +113,7 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
         (": no path", ": no path to its goals was allowed"),
         (": order", ": by order"),
         (NO_ORDER, ": it waited for an order to resume"),
-        ("holding", ": it had reached the end of its plan"),
+        ("holding", ": its plan was at its end, or nothing of interest was left"),
         ("done", ": its survey, or the recording that was played back, had ended"),
     ];
     let in_words = |(short, long): &(&str, &str)| match text.strip_suffix(short)? {
@@ -124,9 +124,9 @@ pub(super) fn event(book: &LabelBook, Event { source, text, .. }: &Event) -> Str
     let text = match (source.as_str(), text.as_str()) {
         ("contact", ANOTHER_RUN) => "the vehicle's program had been restarted".to_owned(),
         ("contact", "received") => "the surface heard it".to_owned(),
-        // What an operator could do then is no part of a report.
-        ("refused", text) if text.contains(": request it, ") => {
-            text.split(": request it, ").next().unwrap_or_default().to_owned()
+        // For how long, and what an operator could do then, is no part of a report.
+        ("refused", text) if text.contains(" has had command for ") => {
+            format!("{} had command", text.split(" has had command for ").next().unwrap_or_default())
         }
         ("answer", text) => text.split_once(' ').map_or_else(
             || text.to_owned(),
@@ -409,7 +409,7 @@ mod tests {
         assert_eq!(told("record", "label 3: name coral"), "label 3: name coral");
         assert_eq!(told("answer", "utility version 2 applied"), "weights applied");
         let refused = "bob: hold: not sent: anna has had command for 5 s: request it, or take it after 1 min";
-        assert_eq!(told("refused", refused), "bob: hold: not sent: anna has had command for 5 s");
+        assert_eq!(told("refused", refused), "bob: hold: not sent: anna had command");
     }
 
     #[test]
