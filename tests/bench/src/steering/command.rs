@@ -14,7 +14,7 @@ use scenecast_tools::commands::SeedArguments;
 /// the next ten minutes, divided by the same time without the order; `class gain` is the same over the true class of most
 /// of that area, of which the label may be a part only. `stay` is the longest time that the vehicle stays within 2 m
 /// without a report that it holds. `turn` is the time from the vehicle's receipt of the order until its heading is within 30
-/// degrees of the way to its nearest cell of the label that it has not looked at since (0 over such a cell; at most 20 s are
+/// degrees of the way to its nearest cell of the label that it has not looked at since (at most 20 s are
 /// waited for), and `purpose` that of the vehicle's plan after 20 s.
 ///
 /// The exit code is 1 if the median gain is below 2 or a stay lasts a minute. The same seed gives the same figures.
