@@ -145,30 +145,30 @@ impl Dive {
 
     /// Who named and merged labels, and when.
     fn changes_of_labels(&self, page: &mut String) {
-        self.table_of(page, ("Names and merges of labels", "vehicle"), |event| {
+        self.table_of(page, "Names and merges of labels", true, |event| {
             event.source == LogKind::Record.name() && said(&event.text, |words| words.starts_with("label ")).is_some()
         });
     }
 
     /// Who had command, and how it passed.
     fn changes_of_command(&self, page: &mut String) {
-        self.table_of(page, ("Who had command", ""), |event| event.source == LogKind::Command.name());
+        self.table_of(page, "Who had command", false, |event| event.source == LogKind::Command.name());
     }
 
-    /// These events under a title, with the vehicle where it has a column.
-    fn table_of(&self, page: &mut String, (title, column): (&str, &str), is_it: impl Fn(&Event) -> bool) {
+    /// These events under a title; `has_vehicles`: with the vehicle that each is about.
+    fn table_of(&self, page: &mut String, title: &str, has_vehicles: bool, is_it: impl Fn(&Event) -> bool) {
+        let vehicle = |cell: String| if has_vehicles { cell } else { String::new() };
         let rows = self.events.iter().filter(|(_, event)| is_it(event)).map(|(at_s, event)| {
-            let (vehicle, told) = (Escaped(&event.vehicle), words::event(self.book(&event.vehicle), event));
-            let (at, told) = (utc_text(*at_s), Escaped(&told));
-            let vehicle = if column.is_empty() { String::new() } else { format!("<td class=\"t\">{vehicle}</td>") };
-            format!("<tr><td class=\"t\">{at}</td>{vehicle}<td>{told}</td></tr>\n")
+            let (at, told) = (utc_text(*at_s), words::event(self.book(&event.vehicle), event));
+            let vehicle = vehicle(format!("<td class=\"t\">{}</td>", Escaped(&event.vehicle)));
+            format!("<tr><td class=\"t\">{at}</td>{vehicle}<td>{}</td></tr>\n", Escaped(&told))
         });
         let rows: String = rows.collect();
-        let column = if column.is_empty() { String::new() } else { format!("<th>{column}</th>") };
         if !rows.is_empty() {
+            let vehicle = vehicle("<th>vehicle</th>".to_owned());
             let _ = writeln!(
                 page,
-                "<h2>{title}</h2>\n<table><thead><tr><th>time (UTC)</th>{column}<th>by whom, and what</th></tr></thead>\n{rows}</table>"
+                "<h2>{title}</h2>\n<table><thead><tr><th>time (UTC)</th>{vehicle}<th>by whom, and what</th></tr></thead>\n{rows}</table>"
             );
         }
     }

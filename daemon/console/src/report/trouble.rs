@@ -83,7 +83,7 @@ impl Dive {
 pub(super) fn modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) -> Vec<String> {
     let all: Vec<(f64, &Event)> = dive.modes(state, vehicle).collect();
     let others = all.iter().enumerate().filter(|(_, (_, event))| !is_survey(&event.text));
-    let limited: Vec<String> = others
+    let others: Vec<String> = others
         .map(|(n, (at_s, event))| {
             let until = all.get(n + 1).map_or_else(|| "the end".to_owned(), |(next_s, _)| utc_text(*next_s));
             let place = vehicle.path().iter().rev().find(|point| point.at_s <= at_s + 1.0);
@@ -98,11 +98,11 @@ pub(super) fn modes(dive: &Dive, state: &VehicleState, vehicle: &DiveVehicle) ->
         true => "Why it did not survey, when the surface learned of it",
         false => "Why it did not survey",
     };
-    let limited = (!limited.is_empty()).then(|| format!("{title}: {}.", limited.join("; ")));
+    let others = (!others.is_empty()).then(|| format!("{title}: {}.", others.join("; ")));
     let ended = all.last().filter(|(_, event)| is_survey(&event.text)).map(|_| "It surveyed until the end.".to_owned());
     let images = (!vehicle.own.images.is_empty())
         .then(|| format!("Images by the vehicle's own record: {}.", vehicle.own.images.join(". After a restart: ")));
-    limited.into_iter().chain(ended).chain(times_of_modes(dive, state, vehicle)).chain(images).collect()
+    others.into_iter().chain(ended).chain(times_of_modes(dive, state, vehicle)).chain(images).collect()
 }
 
 /// The faults that a text of the log names, and whether the survey does not proceed as planned with each; `None` if it is about
