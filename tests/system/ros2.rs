@@ -258,7 +258,7 @@ fn an_order_of_cyclone_passes_the_surfaces_checks() {
     let (status, _) = http(page, "POST", "/api/v2/command", headers, "{\"action\": \"take\"}").unwrap();
     assert_eq!(status, 200, "the page takes command");
     let (level, text) = hold(&["false"]);
-    assert!(level == 30 && text.contains("refused") && text.contains("local has command"), "{text}");
+    assert!(level == 30 && text.contains("refused") && text.contains("local has had command"), "{text}");
     let (level, text) = hold(&["true", "100"]);
     assert!(level == 30 && text.contains("its stamp is 100 s old"), "{text}");
 }
