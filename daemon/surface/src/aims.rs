@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn the_time_over_favoured_floor_is_told_before_and_since_an_order() {
+    fn the_time_over_favoured_floor_is_told_around_an_order() {
         let (map, weight) = (floor(), |label: u8| if label == 4 { 0.8 } else { 0.0 });
         let ground = Ground { map: &map, cell_m: 0.25, weight: &weight, reach_m: 2.0 };
         // Half a metre a second to the east: label 4 from 40 s to 52 s, then it stays there until 100 s.

@@ -126,7 +126,7 @@ impl Surface {
         let Some((record, view)) = self.records.get(&vehicle).zip(self.link.vehicle(vehicle)) else { return };
         let text = record.mode_text(status, &view);
         let is_mode = |entry: &&LogEntry| entry.vehicle == Some(vehicle) && entry.kind == LogKind::Mode;
-        let logged = self.log.entries().rev().find(is_mode).map(|entry| entry.text.as_str());
+        let logged = || self.log.entries().rev().find(is_mode).map(|entry| entry.text.as_str());
         let mode = (status.mode, status.reason);
         if self.watches.entry(vehicle).or_default().handle_mode(mode, &text, logged) {
             self.log_fact(vehicle, LogKind::Mode, &text, now);

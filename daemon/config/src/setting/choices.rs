@@ -50,45 +50,20 @@ impl Choice for Codec {
     }
 }
 
-impl Choice for PlannerKind {
-    const CHOICES: &'static [Self] = &Self::ALL;
+/// Takes the words of enums from their names.
+macro_rules! named {
+    ($($name:ident)*) => { $(
+        impl Choice for $name {
+            const CHOICES: &'static [Self] = &Self::ALL;
 
-    fn word(self) -> &'static str {
-        self.name()
-    }
+            fn word(self) -> &'static str {
+                self.name()
+            }
+        }
+    )* };
 }
 
-impl Choice for AtEnd {
-    const CHOICES: &'static [Self] = &Self::ALL;
-
-    fn word(self) -> &'static str {
-        self.name()
-    }
-}
-
-impl Choice for Reaction {
-    const CHOICES: &'static [Self] = &Self::ALL;
-
-    fn word(self) -> &'static str {
-        self.name()
-    }
-}
-
-impl Choice for SerialFormat {
-    const CHOICES: &'static [Self] = &Self::ALL;
-
-    fn word(self) -> &'static str {
-        self.name()
-    }
-}
-
-impl Choice for FlowControl {
-    const CHOICES: &'static [Self] = &Self::ALL;
-
-    fn word(self) -> &'static str {
-        self.name()
-    }
-}
+named! { AtEnd FlowControl PlannerKind Reaction SerialFormat }
 
 /// Makes enums whose words are their variants' names.
 macro_rules! choices {

@@ -3,6 +3,7 @@
 use super::dive::{Dive, DiveVehicle};
 use super::order_step::OrderKey;
 use super::track_point::TrackPoint;
+use super::trouble::is_because;
 use super::{Escaped, words};
 use scenecast_core::utc_text;
 use scenecast_messages::scenecast_msgs::{Event, OrderStatus};
@@ -325,8 +326,7 @@ impl Way<'_> {
             self.vehicle.stay(self.span_s, |_| true, |point| decimetres(point).is_some_and(|at| fence.allows(at)));
         let out_s = stay.all_s - stay.there_s;
         let is_breach = |(at_s, event): &(f64, &Event)| {
-            let reason = event.text.rsplit_once(": ").map(|(_, reason)| reason);
-            (self.span_s.0..=self.span_s.1).contains(at_s) && reason.is_some() && reason == ModeReason::Fence.name()
+            (self.span_s.0..=self.span_s.1).contains(at_s) && is_because(&event.text, ModeReason::Fence)
         };
         let breach = self.dive.modes(self.state, self.vehicle).find(is_breach);
         (stay.all_s > 0.0).then(|| match (out_s < 0.05, breach) {

@@ -175,8 +175,12 @@ fn is_planned(mode: &str) -> bool {
 /// Whether an order, or the want of one, a limit of distance or time, or the end of its plan led to a mode other than the survey.
 fn is_limited(mode: &str) -> bool {
     let troubles = [ModeReason::Silence, ModeReason::Fence, ModeReason::Band, ModeReason::NoPath];
-    let is_of = |reason: &ModeReason| mode.rsplit_once(": ").is_some_and(|(_, end)| Some(end) == reason.name());
-    !is_survey(mode) && !troubles.iter().any(is_of)
+    !is_survey(mode) && !troubles.into_iter().any(|reason| is_because(mode, reason))
+}
+
+/// Whether a mode has this reason.
+pub(super) fn is_because(mode: &str, reason: ModeReason) -> bool {
+    mode.rsplit_once(": ").is_some_and(|(_, end)| Some(end) == reason.name())
 }
 
 /// Each of these events in a sentence; of many, the first.

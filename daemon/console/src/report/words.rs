@@ -98,8 +98,11 @@ pub(super) fn class(state: &VehicleState, vehicle: &DiveVehicle, class: u8) -> S
     let others = labels_of(state, vehicle, class).into_iter().filter(|label| *label != class);
     let others: Vec<String> = others.map(|other| label(&state.label_book, other)).collect();
     let own = label(&state.label_book, class);
+    if others.is_empty() {
+        return own;
+    }
     let empty = if cells_of(vehicle, class) == 0 { "which has no cell of its own and " } else { "" };
-    if others.is_empty() { own } else { format!("{own}, {empty}into which people merged {},", others.join(" and ")) }
+    format!("{own}, {empty}into which people merged {},", others.join(" and "))
 }
 
 /// An event with reasons of modes in words, and labels with their names.

@@ -60,10 +60,15 @@ impl Watch {
 
     /// The vehicle reports a mode, of which the log would have `text`; returns whether it is news. Of the first one, that depends on
     /// the last mode that an earlier run of the surface has logged; without one the vehicle is expected to survey.
-    pub(crate) fn handle_mode(&mut self, mode: (VehicleMode, ModeReason), text: &str, logged: Option<&str>) -> bool {
+    pub(crate) fn handle_mode<'a>(
+        &mut self,
+        mode: (VehicleMode, ModeReason),
+        text: &str,
+        logged: impl FnOnce() -> Option<&'a str>,
+    ) -> bool {
         match self.mode.replace(mode) {
             Some(before) => before != mode,
-            None => logged.map_or(mode.0 != VehicleMode::Survey, |logged| logged != text),
+            None => logged().map_or(mode.0 != VehicleMode::Survey, |logged| logged != text),
         }
     }
 
@@ -130,14 +135,15 @@ mod tests {
 
     #[test]
     fn the_first_mode_is_news_if_an_earlier_run_has_not_logged_it() {
-        let first = |mode, logged| Watch::default().handle_mode((mode, ModeReason::Fence), "returning: fence", logged);
+        let first =
+            |mode, logged| Watch::default().handle_mode((mode, ModeReason::Fence), "returning: fence", || logged);
         assert!(first(VehicleMode::Return, None) && first(VehicleMode::Return, Some("surveying")));
         assert!(!first(VehicleMode::Return, Some("returning: fence")), "it is in the log");
         assert!(!first(VehicleMode::Survey, None), "as expected");
         let mut watch = Watch::default();
-        watch.handle_mode((VehicleMode::Survey, ModeReason::Survey), "surveying", None);
-        assert!(watch.handle_mode((VehicleMode::Return, ModeReason::Fence), "returning: fence", None));
-        assert!(!watch.handle_mode((VehicleMode::Return, ModeReason::Fence), "returning: fence", None));
+        watch.handle_mode((VehicleMode::Survey, ModeReason::Survey), "surveying", || None);
+        assert!(watch.handle_mode((VehicleMode::Return, ModeReason::Fence), "returning: fence", || None));
+        assert!(!watch.handle_mode((VehicleMode::Return, ModeReason::Fence), "returning: fence", || None));
     }
 
     #[test]

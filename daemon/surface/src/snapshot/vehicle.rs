@@ -31,6 +31,11 @@ fn vehicle(
 ) -> Option<VehicleState> {
     let view = surface.view(address)?;
     let labels = surface.labels(address).unwrap_or_default();
+    let weight = |label| record.weight(label);
+    // Weights and plan belong to the current map.
+    let current = surface.map(address).filter(|_| record.earlier_map().is_none());
+    let cell_m = view.cell_m().unwrap_or(facts.cell_m);
+    let ground = current.map(|map| Ground { map, cell_m, weight: &weight, reach_m: facts.reach_m });
     Some(VehicleState {
         id: address.number(),
         name: record.name.clone(),
@@ -39,8 +44,8 @@ fn vehicle(
         next_contact_s: view.next_contact(now).map(seconds),
         other_surface: other_surface(&view, now),
         status: record.status(&view).map(|(s, at)| status(s, record, &view, *at)),
-        aims: aims(surface, address, record, &view, facts),
-        favoured_time: favoured_time(surface, address, record, &view, facts),
+        aims: ground.as_ref().and_then(|ground| aims(ground, record, &view, facts)),
+        favoured_time: ground.as_ref().and_then(|ground| favoured_time(ground, record, &view)),
         track: track(&record.track),
         registration: record.registration.latest().map(registration),
         closed_loops: track(record.registration.closures()),
@@ -213,44 +218,25 @@ fn status(s: &VehicleStatus, record: &VehicleRecord, view: &PeerView<'_>, at: In
 }
 
 /// What the reported plan is for.
-fn aims(
-    surface: &Surface,
-    address: Address,
-    record: &VehicleRecord,
-    view: &PeerView<'_>,
-    facts: &MissionFacts,
-) -> Option<PlanAims> {
+fn aims(ground: &Ground<'_>, record: &VehicleRecord, view: &PeerView<'_>, facts: &MissionFacts) -> Option<PlanAims> {
     let (status, at) = record.status(view)?;
-    // Weights and plan belong to the current map.
-    let map = surface.map(address).filter(|_| record.earlier_map().is_none())?;
     let purpose = match status.mode {
         VehicleMode::Return => Purpose::Return,
         _ => Purpose::Survey(status.intent),
     };
     let legs: Vec<_> = status.ahead().map(|to| (to.xy(), purpose)).collect();
-    let cell_m = view.cell_m().unwrap_or(facts.cell_m);
-    let weight = |label| record.weight(label);
-    let ground = Ground { map, cell_m, weight: &weight, reach_m: facts.reach_m };
     let speed_m_s = record.track.speed_m_s().unwrap_or(facts.survey_m_s);
     (!legs.is_empty()).then(|| ground.aims(status.position.xy(), &legs, seconds(*at), speed_m_s))
 }
 
 /// What has come of the weights in force.
-fn favoured_time(
-    surface: &Surface,
-    address: Address,
-    record: &VehicleRecord,
-    view: &PeerView<'_>,
-    facts: &MissionFacts,
-) -> Option<FavouredTime> {
-    let map = surface.map(address).filter(|_| record.earlier_map().is_none())?;
+fn favoured_time(ground: &Ground<'_>, record: &VehicleRecord, view: &PeerView<'_>) -> Option<FavouredTime> {
     let is_applied =
         |slot: &&SlotProgress| slot.id == SlotId::Utility && slot.status == directive::OrderStatus::Applied;
     let since_s = view.slots().find(is_applied).map(|slot| seconds(slot.changed))?;
     let favours = record.orders.utility.weights.values().any(|weight| *weight > 0);
-    let weight = |label| record.weight(label);
-    let ground = Ground { map, cell_m: view.cell_m().unwrap_or(facts.cell_m), weight: &weight, reach_m: facts.reach_m };
-    favours.then(|| ground.favoured_time(track(&record.track).into_iter(), since_s)).flatten()
+    let track = record.track.iter().map(|(at, east_m, north_m)| (seconds(at), east_m, north_m));
+    favours.then(|| ground.favoured_time(track, since_s)).flatten()
 }
 
 fn track(track: &Track) -> Vec<(f64, f64, f64)> {
