@@ -202,9 +202,11 @@ pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64
         return Reply::Done;
     }
     let Some(kind) = request.order_kind() else { return reply(surface, request, cell_m, now) };
-    let entry = describe(&request, |id, slot| {
-        Address::vehicle(id).map_or(slot.name(), |vehicle| name_of_order(surface, vehicle, slot))
-    });
+    let stored =
+        |id, label| Address::vehicle(id).and_then(|id| surface.record(id)?.annotations.labels.get(&label).cloned());
+    let name =
+        |id, slot: SlotId| Address::vehicle(id).map_or(slot.name(), |vehicle| name_of_order(surface, vehicle, slot));
+    let entry = describe(&request, name, stored);
     let reply = admitted(surface, request, kind, (&by, cell_m), now);
     if matches!(reply, Reply::Accepted(_)) {
         surface.handle_accepted(&by, kind, now);

@@ -2,6 +2,7 @@
 
 use super::SurfaceRequest;
 use crate::orders::{ExemplarAction, LabelOrder, OrderChanges, member_in_words, name_and_unit};
+use crate::record::StoredLabel;
 use crate::{LimitsOrder, LogKind};
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::wire::Address;
@@ -9,10 +10,11 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// The vehicle, the kind and the text of the entry for a request; `None` if it changes nothing that the log has. `name_of_order` says
-/// what the latest order in a slot of a vehicle is called.
+/// what the latest order in a slot of a vehicle is called, `stored` what a label of a vehicle has been until now.
 pub(super) fn describe(
     request: &SurfaceRequest,
     name_of_order: impl Fn(u8, SlotId) -> &'static str,
+    stored: impl Fn(u8, u8) -> Option<StoredLabel>,
 ) -> Option<(Option<Address>, LogKind, String)> {
     use SurfaceRequest as R;
     let order = |id: u8, text: String| (Address::vehicle(id), LogKind::Order, text);
@@ -62,7 +64,7 @@ pub(super) fn describe(
         R::Restore(id) => order(*id, "orders that the vehicle may have lost are to be sent again".into()),
         R::TakeOver(id) => order(*id, "the vehicle is taken over from another surface".into()),
         R::Budget(budget) => (None, LogKind::Order, format!("budget: {} bit/s", budget.budget_bps)),
-        R::Label(id, order) => record(*id, label(order)),
+        R::Label(id, order) => record(*id, label(order, &stored(*id, order.label).unwrap_or_default())),
         R::Note(id, _, note) => record(*id, format!("note: {}", note.text.trim())),
         R::Marker(id, _, marker) => {
             record(*id, format!("marker at E {:.1} N {:.1} m: {}", marker.x_m, marker.y_m, marker.text.trim()))
@@ -72,14 +74,20 @@ pub(super) fn describe(
     })
 }
 
-/// The name, the colour and the merging of a label, as an edit leaves them.
-fn label(order: &LabelOrder) -> String {
-    let name = order.name.as_ref().map(|name| format!("name {name}"));
-    let name = name.or_else(|| order.merged_into.is_none().then(|| "has no name, is merged into none".to_owned()));
-    let colour = order.colour.as_ref().map(|colour| format!("colour {colour}"));
-    let merged = order.merged_into.map(|into| format!("merged into label {into}"));
-    let all: Vec<String> = [name, colour, merged].into_iter().flatten().collect();
-    format!("label {}: {}", order.label, all.join(", "))
+/// What an edit changes of the name, the colour and the merging of a label.
+fn label(order: &LabelOrder, before: &StoredLabel) -> String {
+    let member = |now: &Option<String>, before: &Option<String>, what: &str| {
+        (now != before).then(|| now.as_ref().map_or_else(|| format!("no {what}"), |now| format!("{what} {now}")))
+    };
+    let merged = match (order.merged_into, before.merged_into) {
+        (now, before) if now == before => None,
+        (Some(into), _) => Some(format!("merged into label {into}")),
+        (None, before) => before.map(|into| format!("no longer merged into label {into}")),
+    };
+    let name = member(&order.name, &before.name, "name");
+    let all: Vec<String> =
+        [name, member(&order.colour, &before.colour, "colour"), merged].into_iter().flatten().collect();
+    format!("label {}: {}", order.label, if all.is_empty() { "as it was".to_owned() } else { all.join(", ") })
 }
 
 /// The weight of an area and the middle of its corners.
@@ -121,8 +129,9 @@ mod tests {
 
     #[test]
     fn requests_are_described_by_what_they_change() {
-        let text =
-            |request: SurfaceRequest| describe(&request, |_, _| "abort").map(|(_, kind, text)| (kind.name(), text));
+        let text = |request: SurfaceRequest| {
+            describe(&request, |_, _| "abort", |_, _| None).map(|(_, kind, text)| (kind.name(), text))
+        };
         let again = SurfaceRequest::Again(1, SlotId::Constraints, "constraints".into());
         assert_eq!(text(again), Some(("order", "abort sent again".into())));
         let weights = SurfaceRequest::Utility(1, [(3, 0.8), (4, 0.0)].into(), (0.1, 0.0));
@@ -145,5 +154,21 @@ mod tests {
         assert_eq!(text(SurfaceRequest::Hold(1, true)), Some(("order", "hold".into())));
         assert_eq!(text(SurfaceRequest::Hold(1, false)), Some(("order", "resume".into())));
         assert_eq!(text(SurfaceRequest::Map(1)), None);
+    }
+
+    #[test]
+    fn an_edit_of_a_label_is_described_by_what_it_changes() {
+        let text = |name: Option<&str>, merged_into, before: &StoredLabel| {
+            let order = LabelOrder { label: 5, name: name.map(str::to_owned), colour: None, merged_into };
+            label(&order, before)
+        };
+        let silt = StoredLabel { name: Some("silt".into()), ..StoredLabel::default() };
+        let merged = StoredLabel { merged_into: Some(6), ..silt.clone() };
+        assert_eq!(text(Some("silt"), None, &StoredLabel::default()), "label 5: name silt");
+        assert_eq!(text(Some("silt"), Some(6), &silt), "label 5: merged into label 6");
+        assert_eq!(text(Some("silt"), Some(7), &merged), "label 5: merged into label 7");
+        assert_eq!(text(Some("silt"), None, &merged), "label 5: no longer merged into label 6");
+        assert_eq!(text(None, None, &merged), "label 5: no name, no longer merged into label 6");
+        assert_eq!(text(Some("silt"), Some(6), &merged), "label 5: as it was");
     }
 }
