@@ -78,6 +78,8 @@ pub struct Steering {
     intent: Option<Intent>,
     /// An adaptive plan found nothing that pays.
     is_complete: bool,
+    /// The vehicle goes to a place beside its survey.
+    is_away: bool,
 }
 
 /// The last two places of the lattice that the vehicle was at.
@@ -122,6 +124,7 @@ impl Steering {
             planned_for: 0,
             intent: None,
             is_complete: false,
+            is_away: false,
         }
     }
 
@@ -133,7 +136,7 @@ impl Steering {
 
     /// The length of one pass of the survey, metres.
     pub fn pass_m(&self) -> f64 {
-        self.grounds.lattice().pass_m()
+        self.grounds.pass_m()
     }
 
     /// The first place of the survey.
@@ -239,6 +242,7 @@ impl Steering {
         self.handle_interest(map.0, utility);
         let left_m = left_m - self.grounds.last_leg_m();
         let Some(at) = self.grounds.entry(from) else { return Course::NoPath };
+        self.is_away = false;
         let approach = distance(from, self.grounds.lattice().place(at));
         self.track.handle_place(at);
         let adapts = self.choice.adapts();

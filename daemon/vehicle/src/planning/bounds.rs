@@ -94,7 +94,7 @@ fn boxes_meet(a: Point, b: Point, c: Point, d: Point) -> bool {
 }
 
 /// The distance in metres between a place and a segment.
-fn to_segment(p: Point, a: Point, b: Point) -> f64 {
+pub(super) fn to_segment(p: Point, a: Point, b: Point) -> f64 {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let length = dx * dx + dy * dy;
     let t = if length > 0.0 { (((p.0 - a.0) * dx + (p.1 - a.1) * dy) / length).clamp(0.0, 1.0) } else { 0.0 };

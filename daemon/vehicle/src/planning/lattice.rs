@@ -150,23 +150,9 @@ impl Lattice {
         }
     }
 
-    /// The length of one pass of all legs and of the steps between them, metres, without ways around areas to stay out of.
-    pub fn pass_m(&self) -> f64 {
-        let mut corners: Vec<Point> = Vec::new();
-        for (leg, line) in self.lines().into_iter().step_by(2).enumerate() {
-            let mut open = line.into_iter().filter(|node| self.is_open(*node));
-            let mut ends: Vec<Node> = open.next().into_iter().chain(open.next_back()).collect();
-            if leg % 2 == 1 {
-                ends.reverse();
-            }
-            corners.extend(ends.into_iter().map(|node| self.place(node)));
-        }
-        corners.iter().zip(corners.iter().skip(1)).map(|(a, b)| distance(*a, *b)).sum()
-    }
-
-    /// How far a place lies from the first leg's side of the world frame, metres.
-    pub fn across_legs(&self, (east_m, north_m): Point) -> f64 {
-        if self.legs_run_north { east_m } else { north_m }
+    /// How far a place lies along the legs, metres of the world frame.
+    pub fn along_legs(&self, (east_m, north_m): Point) -> f64 {
+        if self.legs_run_north { north_m } else { east_m }
     }
 
     pub fn places(&self) -> usize {
@@ -239,6 +225,11 @@ impl Lattice {
 
     /// Shortest paths from a place to all others.
     pub fn paths(&self, from: Node) -> Paths {
+        self.paths_up_to(from, None)
+    }
+
+    /// The same as far as they are needed for the path to one place.
+    pub fn paths_up_to(&self, from: Node, end: Option<Node>) -> Paths {
         let mut paths = Paths { metres: vec![f64::INFINITY; self.places()], before: vec![from; self.places()] };
         paths.metres[from] = 0.0;
         // Keys in whole micrometres have a total order, and ties are broken by the place, so that the tree is the same
@@ -246,6 +237,9 @@ impl Lattice {
         let key = |metres: f64| (metres * 1e6) as u64;
         let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
         while let Some(Reverse((length, node))) = queue.pop() {
+            if Some(node) == end {
+                break;
+            }
             if length > key(paths.metres[node]) {
                 continue;
             }
@@ -290,12 +284,6 @@ mod tests {
         let bounds = Bounds::new(&Fence { keep_outs: vec![wall], ..Fence::default() }, 0.5);
         let lattice = Lattice::new(AREA, &[], 1.0, &bounds);
         (bounds, lattice)
-    }
-
-    #[test]
-    fn a_pass_has_every_other_line_and_the_steps_between_them() {
-        let lattice = Lattice::new(AREA, &[], 1.0, &Bounds::default());
-        assert!((lattice.pass_m() - (6.0 * 20.0 + 5.0 * 2.0)).abs() < 1e-6, "{}", lattice.pass_m());
     }
 
     #[test]

@@ -1,45 +1,79 @@
 //! The planners without a horizon: parallel legs over the whole area, and always the best gain a metre.
 
-use super::bounds::{Point, distance};
+use super::bounds::{Point, distance, to_segment};
 use super::lattice::{Lattice, Node, Paths};
+use super::legs::legs;
 use super::{PlanRequest, Planner};
 
-/// Parallel legs over the area from one side to the other. After the last leg it begins again from there. After a change of the
-/// lattice it resumes at the leg that it was on.
+/// Parallel legs over the area, part by part. After the last leg it begins again from there. What was flown of a pass is not flown
+/// again after a change of the lattice.
 #[derive(Debug, Default)]
 pub struct Lawnmower {
-    /// Places still to visit, the next one last.
+    /// The ends of legs still to visit, the next one last.
     coming: Vec<Node>,
-    /// Whether the legs begin in the north or east.
-    is_backward: bool,
-    /// The next place before the lattice changed.
-    resume: Option<Point>,
+    /// The end that was visited last.
+    begun: Option<Node>,
+    /// The place from which the vehicle left its leg.
+    left: Option<Node>,
+    /// What was flown of this pass.
+    flown: Vec<(Point, Point)>,
+    change: Option<Change>,
+}
+
+/// What a change of the lattice interrupted: the leg, and the place from which the vehicle had left it.
+#[derive(Debug, Default)]
+struct Change {
+    leg: Option<(Point, Point)>,
+    left: Option<Point>,
 }
 
 impl Lawnmower {
-    /// The places of all legs, the first one last; after a change of the lattice, those that were not visited yet.
+    /// The ends of all legs, the first one last; after a change of the lattice, those of what was not flown yet.
     fn lay_out(&mut self, q: &PlanRequest<'_>) -> Vec<Node> {
-        let mut legs = legs(q);
-        let resume = self.resume.take();
-        if resume.is_none() {
-            // Begins at the nearer end.
-            let paths = q.lattice.paths(q.from);
-            let metres = |node: Option<&Node>| node.map_or(f64::INFINITY, |&n| paths.metres[n]);
-            self.is_backward = metres(legs.first()) > metres(legs.last());
+        let change = self.change.take();
+        if let Some(Change { leg: Some((from, to)), left }) = &change {
+            let here = left.unwrap_or_else(|| q.lattice.place(q.from));
+            self.flown.extend(as_far_as((*from, *to), here, q.lattice.step_m()).map(|end| (*from, end)));
         }
-        if !self.is_backward {
-            legs.reverse();
+        if change.is_none() {
+            self.flown.clear();
         }
-        let Some(next) = resume else { return legs };
-        let half = q.lattice.step_m() / 2.0;
-        let is_next = |n: &Node| distance(q.lattice.place(*n), next) < half;
-        let ahead = |n: &Node| q.lattice.across_legs(q.lattice.place(*n)) - q.lattice.across_legs(next);
-        let is_later = |n: &Node| if self.is_backward { ahead(n) < half } else { ahead(n) > -half };
-        if let Some(at) = legs.iter().rposition(is_next).or_else(|| legs.iter().rposition(is_later)) {
-            legs.truncate(at + 1);
+        let mut legs = self.unflown(q);
+        if legs.is_empty() && !self.flown.is_empty() {
+            self.flown.clear();
+            legs = self.unflown(q);
         }
+        legs.reverse();
         legs
     }
+
+    fn unflown(&self, q: &PlanRequest<'_>) -> Vec<Node> {
+        let half = q.lattice.step_m() / 2.0;
+        let is_flown = |node| self.flown.iter().any(|leg| to_segment(q.lattice.place(node), leg.0, leg.1) < half);
+        // The rest of a leg begins where the vehicle is.
+        let is_left = |node| node == q.from || !is_flown(node);
+        let legs = legs(q.lattice, q.from, |node| q.return_paths.metres[node].is_finite() && is_left(node));
+        if legs == [q.from] { Vec::new() } else { legs }
+    }
+
+    /// The leg that the vehicle is on, if it is not between two of them.
+    fn leg(&self, lattice: &Lattice) -> Option<(Point, Point)> {
+        let (from, to) = (lattice.place(self.begun?), lattice.place(*self.coming.last()?));
+        ((lattice.along_legs(to) - lattice.along_legs(from)).abs() + 1e-6 > distance(from, to)).then_some((from, to))
+    }
+
+    fn handle_arrival(&mut self, lattice: &Lattice) {
+        self.flown.extend(self.leg(lattice));
+        (self.begun, self.left) = (self.coming.pop(), None);
+    }
+}
+
+/// The end of the part of a leg that was flown by a vehicle that is `here`; `None` if that is not on the leg.
+fn as_far_as((from, to): (Point, Point), here: Point, near_m: f64) -> Option<Point> {
+    let (x, y) = (to.0 - from.0, to.1 - from.1);
+    let share = ((here.0 - from.0) * x + (here.1 - from.1) * y) / (x * x + y * y).max(1e-9);
+    let end = (from.0 + share * x, from.1 + share * y);
+    ((0.0..=1.0).contains(&share) && distance(here, end) <= near_m).then_some(end)
 }
 
 impl Planner for Lawnmower {
@@ -49,13 +83,18 @@ impl Planner for Lawnmower {
         }
         while let Some(&next) = self.coming.last() {
             if next == q.from {
-                self.coming.pop();
+                self.handle_arrival(q.lattice);
+                continue;
+            }
+            if let Some(left) = self.left.take().filter(|&left| left != q.from && left != next) {
+                self.coming.push(left);
                 continue;
             }
             let paths = q.lattice.paths(q.from);
             let mut path = paths.to(next);
             if path.is_empty() {
                 self.coming.pop();
+                self.begun = None;
                 continue;
             }
             path.truncate(path.iter().take_while(|&&n| q.can_return(n, paths.metres[n])).count());
@@ -68,32 +107,22 @@ impl Planner for Lawnmower {
         self.coming.iter().rev().copied().collect()
     }
 
+    fn handle_leave(&mut self, at: Node, lattice: &Lattice) {
+        let is_on_it =
+            self.leg(lattice).is_some_and(|leg| as_far_as(leg, lattice.place(at), lattice.step_m()).is_some());
+        self.left = Some(at).filter(|_| is_on_it);
+    }
+
     fn handle_change(&mut self, before: &Lattice) {
-        if let Some(&next) = self.coming.last() {
-            self.resume = Some(before.place(next));
+        let leg = self.leg(before);
+        // Of several changes before the next plan, the first one knows the leg.
+        self.change.get_or_insert_default();
+        if let Some(change) = self.change.as_mut().filter(|_| leg.is_some()) {
+            (change.leg, change.left) = (leg, self.left.map(|left| before.place(left)));
         }
+        (self.begun, self.left) = (None, None);
         self.coming.clear();
     }
-}
-
-/// The ends of the open stretches of every other line of the area, in alternating direction.
-fn legs(q: &PlanRequest<'_>) -> Vec<Node> {
-    let mut legs = Vec::new();
-    for (leg, line) in q.lattice.lines().into_iter().step_by(2).enumerate() {
-        let is_open = |n: &Node| q.lattice.is_open(*n) && q.return_paths.metres[*n].is_finite();
-        let next = line.get(1).map_or(1, |second| second - line[0]);
-        let mut stretch: Vec<Node> = line.into_iter().filter(is_open).collect();
-        if leg % 2 == 1 {
-            stretch.reverse();
-        }
-        let inner = |i: usize| {
-            let joined =
-                |j: Option<usize>| j.and_then(|j| stretch.get(j)).is_some_and(|&n| stretch[i].abs_diff(n) == next);
-            joined(i.checked_sub(1)) && joined(Some(i + 1))
-        };
-        legs.extend((0..stretch.len()).filter(|&i| !inner(i)).map(|i| stretch[i]));
-    }
-    legs
 }
 
 /// Goes to the place with the greatest gain for each metre of path. The gain includes everything that

@@ -5,6 +5,7 @@ mod expect;
 mod horizon;
 mod lattice;
 mod lawnmower;
+mod legs;
 mod value;
 
 pub use bounds::{Bounds, Point, distance};
@@ -12,6 +13,7 @@ pub use expect::{Expectation, SeenLabels};
 pub use horizon::Horizon;
 pub use lattice::{Lattice, Node, Paths};
 pub use lawnmower::{Greedy, Lawnmower};
+pub use legs::{legs, length_m};
 pub use value::{BlockValues, CellWindow, Interest, Knowledge, ShownBlocks};
 
 use scenecast_protocol::directive::PlannerKind;
@@ -51,6 +53,9 @@ pub trait Planner: std::fmt::Debug + Send {
     fn beyond(&self) -> Vec<Node> {
         Vec::new()
     }
+
+    /// The vehicle leaves its path at a place, and will come back to it.
+    fn handle_leave(&mut self, _at: Node, _lattice: &Lattice) {}
 
     /// The lattice has changed, and with it the numbers of the places. `before` is the last one.
     fn handle_change(&mut self, _before: &Lattice) {}

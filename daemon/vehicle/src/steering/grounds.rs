@@ -1,8 +1,11 @@
 //! The survey area within the fence, the return path from each place of it, and the planner that is in use.
 
-use crate::planning::{Bounds, Lattice, Node, Paths, Planner, Point, distance, planner};
+use crate::planning::{Bounds, Lattice, Node, Paths, Planner, Point, distance, legs, length_m, planner};
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, PlannerKind};
+
+/// A pass in the other direction is taken if it costs less than this part of the one that the area alone suggests.
+const CLEARLY: f64 = 0.97;
 
 /// The lattice over area and fence, in the world frame.
 #[derive(Debug)]
@@ -31,7 +34,7 @@ impl Grounds {
         let (return_point, return_paths, last_leg_m) = (None, None, 0.0);
         let mut grounds =
             Self { area, reach_m, step_m, clearance_m, bounds, start, return_point, lattice, return_paths, last_leg_m };
-        let (_, legs) = grounds.legs_area();
+        let legs = grounds.legs_area(grounds.legs_run_north());
         grounds.start = (legs.west, legs.south);
         grounds.lay_out();
         grounds
@@ -74,8 +77,7 @@ impl Grounds {
     }
 
     fn lay_out(&mut self) -> Lattice {
-        let (legs_run_north, area) = self.legs_area();
-        let lattice = Lattice::with_legs(legs_run_north, area, &[self.return_place()], self.step_m, &self.bounds);
+        let lattice = self.best_lattice();
         let before = std::mem::replace(&mut self.lattice, lattice);
         let end = self.entry(self.return_place());
         self.return_paths = end.map(|n| self.lattice.paths(n));
@@ -83,11 +85,44 @@ impl Grounds {
         before
     }
 
-    /// Whether the legs run north, and the area that they are fitted to: from its edges the camera sees those of the survey area, as
-    /// far as the fence allows.
-    fn legs_area(&self) -> (bool, Area) {
+    /// The lattice in whose legs a pass is shorter: by the area, or as the fence and the areas to stay out of leave it.
+    fn best_lattice(&self) -> Lattice {
+        let legs_run_north = self.legs_run_north();
+        let lattice = |legs_run_north| {
+            let area = self.legs_area(legs_run_north);
+            Lattice::with_legs(legs_run_north, area, &[self.return_place()], self.step_m, &self.bounds)
+        };
+        let by_area = lattice(legs_run_north);
+        if self.bounds == Bounds::new(&Fence::default(), self.clearance_m) {
+            return by_area;
+        }
+        // A turn costs as much as one step of the lattice.
+        let cost_m = |lattice: &Lattice| {
+            let legs = self.legs_of(lattice);
+            length_m(lattice, &legs) + legs.len() as f64 * self.step_m
+        };
+        let other = lattice(!legs_run_north);
+        if cost_m(&other) < CLEARLY * cost_m(&by_area) { other } else { by_area }
+    }
+
+    /// The ends of all legs of a lattice, from the first place of the survey.
+    fn legs_of(&self, lattice: &Lattice) -> Vec<Node> {
+        lattice.entry(self.start, &self.bounds).map_or_else(Vec::new, |from| legs(lattice, from, |_| true))
+    }
+
+    /// The length of one pass of the survey, metres.
+    pub(super) fn pass_m(&self) -> f64 {
+        length_m(&self.lattice, &self.legs_of(&self.lattice))
+    }
+
+    /// Whether legs that run north are shorter in all, by the area.
+    fn legs_run_north(&self) -> bool {
+        Lattice::legs_run_north(self.within_fence(self.area.shrunk(self.reach_m)), self.step_m)
+    }
+
+    /// The area that the legs are fitted to: from its edges the camera sees those of the survey area, as far as the fence allows.
+    fn legs_area(&self, legs_run_north: bool) -> Area {
         let inner = self.within_fence(self.area.shrunk(self.reach_m));
-        let legs_run_north = Lattice::legs_run_north(inner, self.step_m);
         // The end of a leg counts as reached before the vehicle is there.
         let ends = self.area.shrunk((self.reach_m - self.arrival_m()).max(self.reach_m / 2.0));
         let (width_m, height_m) = inner.size_m();
@@ -96,7 +131,7 @@ impl Grounds {
             true => Area { south: ends.south, north: ends.north, ..inner },
             false => Area { west: ends.west, east: ends.east, ..inner },
         };
-        (legs_run_north, self.within_fence(legs))
+        self.within_fence(legs)
     }
 
     /// What the fence leaves of an area; all of it if that is nothing.

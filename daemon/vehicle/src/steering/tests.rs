@@ -67,6 +67,55 @@ fn a_fence_that_leaves_a_leg_as_it_is_keeps_the_progress() {
 }
 
 #[test]
+fn a_leg_that_was_left_for_a_destination_is_flown_from_where_it_was_left() {
+    let map = LabelGrid::default();
+    let mut steering = steering(PlannerKind::Horizon);
+    let track = drive(&mut steering, &map, None, 6);
+    let (begin, Course::Go(end)) = (track[6], steering.next(track[6], (&map, 6), None, f64::INFINITY)) else {
+        panic!("no leg")
+    };
+    let left = ((begin.0 * 2.0 + end.0) / 3.0, begin.1);
+    steering.set_destination(Some(DecimetrePoint::new(40, 20)));
+    let mut at = left;
+    while let Some(Course::Go(to)) = steering.next_detour(at, f64::INFINITY) {
+        at = to;
+    }
+    assert!(distance(at, (4.0, 2.0)) < 0.6, "{at:?}");
+    let mut after = Vec::new();
+    while after.last() != Some(&end) && after.len() < 9 {
+        let Course::Go(to) = steering.next(at, (&map, 7), None, f64::INFINITY) else { panic!("no way back") };
+        after.push(to);
+        at = to;
+    }
+    let back = after.iter().position(|&to| distance(to, left) <= steering.grounds.lattice().step_m());
+    assert!(back.is_some_and(|back| back + 1 < after.len()), "left {left:?} of {begin:?} to {end:?}: {after:?}");
+}
+
+#[test]
+fn a_fence_in_the_middle_of_a_leg_leaves_out_what_was_flown() {
+    let map = LabelGrid::default();
+    let mut steering = steering(PlannerKind::Horizon);
+    let track = drive(&mut steering, &map, None, 6);
+    let Course::Go(end) = steering.next(track[6], (&map, 6), None, f64::INFINITY) else { panic!("no leg") };
+    let half = ((track[6].0 + end.0) / 2.0, end.1);
+    let block = Polygon([(20, 10), (40, 10), (40, 20), (20, 20)].map(|(x, y)| DecimetrePoint::new(x, y)).into());
+    steering.set_fence(&Fence { keep_outs: vec![block], ..Fence::default() });
+    let mut at = half;
+    let mut visited = Vec::new();
+    for _ in 0..20 {
+        let Course::Go(to) = steering.next(at, (&map, 7), None, f64::INFINITY) else { break };
+        visited.push(to);
+        at = to;
+        if to.1 > 10.0 && visited.len() > 3 {
+            break;
+        }
+    }
+    assert!(distance(*visited.last().unwrap(), track[0]) > 8.0, "{visited:?}");
+    assert!(visited.iter().all(|to| to.1 > end.1 - 0.1), "nothing is flown again: {visited:?}");
+    assert!(visited.iter().any(|to| distance(*to, end) < 0.1), "the leg is finished: {visited:?}");
+}
+
+#[test]
 fn an_adaptive_plan_has_a_purpose_while_anything_is_of_interest() {
     let mut map = LabelGrid::default();
     (0..48).for_each(|y| {

@@ -18,8 +18,18 @@ impl Steering {
 
     /// The next waypoint of the return path.
     pub fn next_return(&mut self, from: Point) -> Course {
+        self.leave_survey(from);
         self.replan();
         self.course_to(from, self.return_place())
+    }
+
+    /// Tells the planner where the survey is left, once.
+    fn leave_survey(&mut self, from: Point) {
+        if !std::mem::replace(&mut self.is_away, true)
+            && let Some(at) = self.grounds.entry(from)
+        {
+            self.choice.planner_mut().handle_leave(at, self.grounds.lattice());
+        }
     }
 
     /// The next waypoint on the path to the destination, or [`Course::LimitReached`] if path and return path take more than
@@ -27,6 +37,7 @@ impl Steering {
     /// if no allowed path leads there any more.
     pub fn next_detour(&mut self, from: Point, left_m: f64) -> Option<Course> {
         let to = self.destination?;
+        self.leave_survey(from);
         self.replan();
         let course = match self.detour(from, to) {
             Course::Go(_) if self.detour_m(from, to) > left_m => Some(Course::LimitReached),
