@@ -18,7 +18,7 @@ URL = sys.argv[1].rstrip("/")
 # Those that are missing here name a label of the map.
 ORDERS = {
     "set_utility": {"weights": {}, "exploration": 0.1},
-    "dry_run": {"weights": {}, "exploration": 0.1},
+    "dry_run": {"weights": {}, "exploration": 0.1, "fence": {"fence": [[-200, -200], [200, -200], [200, 200]]}},
     "set_constraints": {"action": "resume"},
     "set_fence": {"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]], "keep_outs": [], "return_point": [0, 0]},
     "set_areas": {"areas": [{"outline": [[0, 0], [30, 0], [30, 20]], "weight": 0.5}]},

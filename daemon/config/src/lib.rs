@@ -32,7 +32,7 @@ pub use sections::{
 };
 pub use setting::{
     Authenticate, AutopilotKind, BandRange, BirthRule, CalibrationSource, CameraSource, CameraStamps, Debounce,
-    DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, MapCells, ModemKind, NavigationSource,
-    OperatorScript, PageOrigin, Remap, RestoreOrders, RosName, RosTransport, S2cMode, SceneLabels, StartMode, Votes,
-    WorldKind, ZenohEndpoint,
+    DepthSource, GpsPort, HostPort, LabelMessage, LabelSource, LayerName, LegDirection, MapCells, ModemKind,
+    NavigationSource, OperatorScript, PageOrigin, Remap, RestoreOrders, RosName, RosTransport, S2cMode, SceneLabels,
+    StartMode, Votes, WorldKind, ZenohEndpoint,
 };

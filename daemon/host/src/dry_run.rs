@@ -8,8 +8,8 @@ use scenecast_protocol::link::IssueError;
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
-use scenecast_surface::state::{DryRun, FirstTarget, LegReason, PlanAims, PlanLeg, seconds};
-use scenecast_surface::{Ground, LabelBook, OrderRefusal, Place, Purpose, Surface};
+use scenecast_surface::state::{DryRun, FirstTarget, LegReason, PlanAims, PlanLeg, SurveyPass, seconds};
+use scenecast_surface::{FenceOrder, Ground, LabelBook, OrderRefusal, Place, Purpose, Surface};
 use scenecast_vehicle::planning::distance;
 use scenecast_vehicle::{Alternative, Course, Steering, footprint, steering};
 use std::collections::BTreeMap;
@@ -55,12 +55,12 @@ impl DryRunTask {
     /// Takes what the surface knows of a vehicle that has reported its place.
     ///
     /// # Errors
-    /// There is no such vehicle, or the weights are not allowed.
+    /// There is no such vehicle, or the weights or the fence are not allowed.
     pub fn new(
         surface: &Surface,
         config: Arc<Config>,
         vehicle: Address,
-        (weights, terms): (&BTreeMap<u8, f64>, (f64, f64)),
+        (weights, terms, fence): (&BTreeMap<u8, f64>, (f64, f64), Option<&FenceOrder>),
         cell_m: f64,
         now: Instant,
     ) -> Result<Self, OrderRefusal> {
@@ -75,8 +75,10 @@ impl DryRunTask {
         let places = |before: bool| {
             record.track.iter().filter(|&(at, ..)| is_before(at) == before).map(|(_, x, y)| (x, y)).collect()
         };
+        let fence = fence.map(FenceOrder::read).transpose()?;
+        let in_force = || record.orders.fence.in_force.as_ref().map(|(_, fence)| fence.clone()).unwrap_or_default();
         let orders = OrdersInForce {
-            fence: record.orders.fence.in_force.as_ref().map(|(_, fence)| fence.clone()).unwrap_or_default(),
+            fence: fence.unwrap_or_else(in_force),
             areas: record.orders.areas.in_force.as_ref().map(|(_, areas)| areas.clone()).unwrap_or_default(),
             destination: record.orders.destination.in_force.as_ref().and_then(|(_, to)| to.place),
             settings: record.orders.settings.in_force().copied().unwrap_or_default(),
@@ -113,6 +115,9 @@ impl DryRunTask {
     /// Plans the path.
     pub fn run(self) -> DryRun {
         let mut steering = self.steering();
+        let pass_m = steering.pass_m();
+        let pass =
+            (pass_m > 0.0).then(|| SurveyPass { metres: pass_m.round(), time_s: (pass_m / self.speed_m_s).round() });
         let (legs, other) = self.fly(&mut steering);
         let weight = |label: u8| self.utility[1].weight(label);
         let reach_m = footprint(&self.config).reach();
@@ -128,6 +133,7 @@ impl DryRunTask {
             text: self.text(&aims, other, now_s),
             rests_on: self.rests_on,
             aims,
+            pass,
         }
     }
 

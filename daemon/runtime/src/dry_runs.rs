@@ -58,13 +58,13 @@ impl DryRuns {
         cell_m: f64,
         now: Instant,
     ) -> Result<DryRunTask, Box<Reply>> {
-        let SurfaceRequest::DryRun(id, weights, terms) = request else { return Err(Box::new(Reply::NotFound)) };
+        let SurfaceRequest::DryRun(id, weights, terms, fence) = request else { return Err(Box::new(Reply::NotFound)) };
         let vehicle = Address::vehicle(*id).filter(|&vehicle| surface.record(vehicle).is_some());
         let vehicle = vehicle.ok_or(Box::new(Reply::NotFound))?;
         if Arc::strong_count(&self.one) > MAX_WAITING {
             return Err(Box::new(Reply::Refused("too many dry runs at once: try again soon".to_owned())));
         }
-        DryRunTask::new(surface, self.config.clone(), vehicle, (weights, *terms), cell_m, now)
+        DryRunTask::new(surface, self.config.clone(), vehicle, (weights, *terms, fence.as_ref()), cell_m, now)
             .map_err(|refusal| Box::new(Reply::Refused(refusal.to_string())))
     }
 }

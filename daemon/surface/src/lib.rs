@@ -51,9 +51,9 @@ pub use map_cells::{CellLayer, MapCaption, MapCells, tile_place};
 pub use map_changes::LabelGains;
 pub use orders::{
     AgainOrder, AreaOrder, AreasOrder, BudgetOrder, CONSTRAINT_NAMES, CommandOrder, CommandOrderAction,
-    ConstraintsAction, ConstraintsOrder, DestinationOrder, DismissOrder, DraftOrder, ExemplarAction, ExemplarOrder,
-    FenceOrder, LabelOrder, LimitsOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder, RestoreOrder,
-    SettingsOrder, SharesOrder, TakeOverOrder, UtilityOrder, member_in_words, order_name, value_in_words,
+    ConstraintsAction, ConstraintsOrder, DestinationOrder, DismissOrder, DraftOrder, DryRunOrder, ExemplarAction,
+    ExemplarOrder, FenceOrder, LabelOrder, LimitsOrder, MarkerOrder, NoteOrder, OrderChanges, RemoveMarkerOrder,
+    RestoreOrder, SettingsOrder, SharesOrder, TakeOverOrder, UtilityOrder, member_in_words, order_name, value_in_words,
 };
 pub use refusal::{OrderRefusal, Weighed};
 pub use request::{ClientRequest, Reply, SurfaceRequest, archived_cells, cell_layers, former_labels, handle_request};

@@ -56,7 +56,7 @@ pub enum SurfaceRequest {
     Fit(u8, Option<f64>),
     /// Plan what the vehicle would do by weights of labels, of unexplored cells and of curiosity, which are not sent. The owner
     /// of the vehicle's planner handles this request.
-    DryRun(u8, BTreeMap<u8, f64>, (f64, f64)),
+    DryRun(u8, BTreeMap<u8, f64>, (f64, f64), Option<FenceOrder>),
     /// Send the weights of labels, and those of unexplored cells and of curiosity.
     Utility(u8, BTreeMap<u8, f64>, (f64, f64)),
     /// Request an image of a label, or cancel the request.

@@ -16,7 +16,7 @@ pub use command::{
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel, MapLabelTree};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
 pub use map::{CellHistory, EarlierMap, FormerLabel, MapPlacement, MapSummary};
-pub use plan::{DryRun, FavouredTime, FirstTarget, LegReason, PlanAims, PlanLeg};
+pub use plan::{DryRun, FavouredTime, FirstTarget, LegReason, PlanAims, PlanLeg, SurveyPass};
 pub use replay::{DifferingCells, ReplayEvent, ReplayEventList, ReplayOrder, ReplaySide, ReplayState};
 pub use storage::{ArchivedMap, StorageInfo, VehicleMarker, VehicleNote};
 pub use vehicle::{

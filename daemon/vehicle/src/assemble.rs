@@ -58,7 +58,9 @@ pub fn assemble(
 /// The choice of waypoints within `area`, as configured, on a map with cells of `cell_m` metres.
 pub fn steering(config: &Config, area: Area, cell_m: f64) -> Steering {
     let survey = &config.survey;
-    Steering::new(area, footprint(config), cell_m, survey.planner, survey.clearance_m).with_end(survey.at_end)
+    Steering::new(area, footprint(config), cell_m, survey.planner, survey.clearance_m)
+        .with_end(survey.at_end)
+        .with_legs(survey.legs)
 }
 
 /// The configured end of the link.

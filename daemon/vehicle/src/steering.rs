@@ -10,6 +10,7 @@ use grounds::{Grounds, PlannerChoice};
 use to_place::Views;
 
 use super::planning::{BlockValues, Bounds, CellWindow, Interest, Knowledge, Node, PlanRequest, Point, distance};
+use scenecast_config::LegDirection;
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Areas, AtEnd, Fence, PlannerKind, Utility, WeightedArea};
 use scenecast_protocol::map::{Cell, LabelGrid};
@@ -131,6 +132,12 @@ impl Steering {
     /// The same with another configured end of the survey than [`AtEnd::Explore`].
     pub fn with_end(mut self, configured: AtEnd) -> Self {
         self.at_end.0 = configured;
+        self
+    }
+
+    /// The same with legs in a configured direction.
+    pub fn with_legs(mut self, direction: LegDirection) -> Self {
+        self.grounds.set_legs(direction);
         self
     }
 

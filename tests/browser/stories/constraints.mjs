@@ -107,6 +107,7 @@ export default [
       assert.equal(await s.page.locator("#fence-preview").isVisible(), false);
       await s.button("Done drawing").click();
       await s.shows("#fence-preview", /^Area [\d\s]+ m\u00b2\. [\d\s]+ of [\d\s]+ explored cells lie outside .* from the nearest edge/);
+      await s.shows("#fence-preview", /One pass in straight legs within it takes about 29.min 34.s, 887.m\.$/);
       assert.equal(await sendFence(s).isDisabled(), false);
       await sendFence(s).click();
       await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/fence")));

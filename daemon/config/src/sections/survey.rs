@@ -2,7 +2,7 @@
 
 use super::key::section;
 use crate::rule::{ANY, ports, range};
-use crate::setting::{AutopilotKind, GpsPort, NavigationSource, StartMode};
+use crate::setting::{AutopilotKind, GpsPort, LegDirection, NavigationSource, StartMode};
 use scenecast_core::{Area, PortAddress};
 use scenecast_protocol::directive::{AtEnd, PlannerKind, Reaction};
 use std::path::PathBuf;
@@ -27,6 +27,9 @@ section! {
         /// needs 10 % of overlap to close loops between legs. Legs are never further apart than nine tenths of a frame's
         /// shorter side, so that 30 % changes nothing for a frame of 4:3, and brings the legs of a square one closer.
         leg_overlap_percent: f64 = 30.0, range(0.0, 90.0, "%"), [Auv Asv Scenario];
+        /// Direction of the straight legs. shortest: the one in which a pass takes less, by the area, the fence and the areas to stay
+        /// out of; east-west and north-south, as a current or a slope may ask for.
+        legs: LegDirection = LegDirection::Shortest, ANY, [Auv Asv Scenario];
         /// File of a fence for a vehicle that has no orders from before its start: GeoJSON, as scenecast ctl fence set takes
         /// it. Empty: none.
         fence_file: Option<PathBuf> = None, ANY, [Auv];

@@ -197,6 +197,16 @@ choices! {
         Free,
     }
 
+    /// The direction of the straight legs of a survey.
+    LegDirection "kebab-case" {
+        /// The one in which a pass is shorter.
+        Shortest,
+        /// East and west.
+        EastWest,
+        /// North and south.
+        NorthSouth,
+    }
+
     /// What the operator of a rehearsal does.
     OperatorScript "lowercase" {
         /// Two utilities and some exemplar requests, at fixed shares of the survey's duration.

@@ -10,8 +10,8 @@ mod tables;
 mod texts;
 
 pub use choices::{
-    Authenticate, AutopilotKind, BirthRule, CameraStamps, MapCells, ModemKind, OperatorScript, RestoreOrders,
-    RosTransport, S2cMode, SceneLabels, StartMode, WorldKind,
+    Authenticate, AutopilotKind, BirthRule, CameraStamps, LegDirection, MapCells, ModemKind, OperatorScript,
+    RestoreOrders, RosTransport, S2cMode, SceneLabels, StartMode, WorldKind,
 };
 pub use labels::{BandRange, Debounce, LabelMessage, LabelSource, Votes};
 pub use ports::{GpsPort, HostPort, PageOrigin};

@@ -16,8 +16,8 @@ use scenecast_protocol::directive::{Constraints, Slot};
 use serde_json::Value;
 pub use settings::SettingsOrder;
 pub use tasks::{
-    AgainOrder, BudgetOrder, CONSTRAINT_NAMES, ConstraintsAction, ConstraintsOrder, ExemplarAction, ExemplarOrder,
-    RestoreOrder, SharesOrder, TakeOverOrder, UtilityOrder,
+    AgainOrder, BudgetOrder, CONSTRAINT_NAMES, ConstraintsAction, ConstraintsOrder, DryRunOrder, ExemplarAction,
+    ExemplarOrder, RestoreOrder, SharesOrder, TakeOverOrder, UtilityOrder,
 };
 
 /// The number of a label as the name of a member: 1 to 254, without a sign or a leading zero.

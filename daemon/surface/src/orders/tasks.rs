@@ -1,5 +1,6 @@
 //! Orders of what a vehicle does and sends, which are given to it as they are.
 
+use super::FenceOrder;
 use super::LABEL;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use schemars::JsonSchema;
@@ -22,6 +23,28 @@ pub struct UtilityOrder {
     #[serde(default)]
     #[schemars(range(min = -1.0, max = 1.0))]
     pub curiosity: f64,
+}
+
+/// Weights, and a fence, to try without sending them.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DryRunOrder {
+    /// -1 to 1 by label, which must be on the map.
+    #[serde(default)]
+    #[schemars(extend("propertyNames" = { "pattern": LABEL }))]
+    #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1, "maximum": 1 }))]
+    pub weights: BTreeMap<String, f64>,
+    /// The weight of unexplored cells, -1 to 1.
+    #[serde(default)]
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub exploration: f64,
+    /// The weight of cells that the scene model explains badly, -1 to 1.
+    #[serde(default)]
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub curiosity: f64,
+    /// The whole fence in place of the one in force; null or absent: that one.
+    #[serde(default)]
+    pub fence: Option<FenceOrder>,
 }
 
 /// Requests an image of a label in place of an earlier request for that label, or cancels the request.

@@ -89,4 +89,15 @@ pub struct DryRun {
     pub text: String,
     /// What the plan rests on, in a sentence.
     pub rests_on: String,
+    /// One pass of the area in straight legs within the fence; null where the fence leaves no legs.
+    pub pass: Option<SurveyPass>,
+}
+
+/// One pass of a survey area in straight legs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SurveyPass {
+    /// Length of the path, metres.
+    pub metres: f64,
+    /// Time that it takes at the vehicle's speed, seconds.
+    pub time_s: f64,
 }

@@ -25,6 +25,11 @@ impl Bounds {
         }
     }
 
+    /// The number of outlines.
+    pub fn outlines(&self) -> usize {
+        self.keep_outs.len() + usize::from(self.fence.is_some())
+    }
+
     /// The smallest rectangle around all places within the fence that a plan may contain; `None` without a fence.
     pub fn extent(&self) -> Option<Area> {
         let corners = self.fence.as_ref()?;

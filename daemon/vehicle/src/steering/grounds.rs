@@ -1,6 +1,7 @@
 //! The survey area within the fence, the return path from each place of it, and the planner that is in use.
 
 use crate::planning::{Bounds, Lattice, Node, Paths, Planner, Point, distance, legs, length_m, planner};
+use scenecast_config::LegDirection;
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, PlannerKind};
 
@@ -16,6 +17,7 @@ pub(super) struct Grounds {
     /// Distance between two places of the lattice, metres; legs are two of them apart.
     step_m: f64,
     clearance_m: f64,
+    direction: LegDirection,
     bounds: Bounds,
     /// The first place of the survey. Without a return point the vehicle returns to it.
     start: Point,
@@ -31,13 +33,29 @@ impl Grounds {
         let bounds = Bounds::default();
         let lattice = Lattice::new(area.shrunk(reach_m), &[], step_m, &bounds);
         let start = lattice.place(0);
-        let (return_point, return_paths, last_leg_m) = (None, None, 0.0);
-        let mut grounds =
-            Self { area, reach_m, step_m, clearance_m, bounds, start, return_point, lattice, return_paths, last_leg_m };
-        let legs = grounds.legs_area(grounds.legs_run_north());
-        grounds.start = (legs.west, legs.south);
-        grounds.lay_out();
+        let mut grounds = Self {
+            area,
+            reach_m,
+            step_m,
+            clearance_m,
+            direction: LegDirection::Shortest,
+            bounds,
+            start,
+            return_point: None,
+            lattice,
+            return_paths: None,
+            last_leg_m: 0.0,
+        };
+        grounds.set_legs(LegDirection::Shortest);
         grounds
+    }
+
+    /// Lays out the lattice with legs in a direction, before any fence is in force.
+    pub(super) fn set_legs(&mut self, direction: LegDirection) {
+        self.direction = direction;
+        let legs = self.legs_area(self.legs_run_north());
+        self.start = (legs.west, legs.south);
+        self.lay_out();
     }
 
     pub(super) fn area(&self) -> Area {
@@ -93,7 +111,8 @@ impl Grounds {
             Lattice::with_legs(legs_run_north, area, &[self.return_place()], self.step_m, &self.bounds)
         };
         let by_area = lattice(legs_run_north);
-        if self.bounds == Bounds::new(&Fence::default(), self.clearance_m) {
+        let is_free = self.bounds.outlines() == 0;
+        if self.direction != LegDirection::Shortest || is_free {
             return by_area;
         }
         // A turn costs as much as one step of the lattice.
@@ -115,9 +134,15 @@ impl Grounds {
         length_m(&self.lattice, &self.legs_of(&self.lattice))
     }
 
-    /// Whether legs that run north are shorter in all, by the area.
+    /// Whether the legs run north: as configured, or where they are shorter in all by the area.
     fn legs_run_north(&self) -> bool {
-        Lattice::legs_run_north(self.within_fence(self.area.shrunk(self.reach_m)), self.step_m)
+        match self.direction {
+            LegDirection::Shortest => {
+                Lattice::legs_run_north(self.within_fence(self.area.shrunk(self.reach_m)), self.step_m)
+            }
+            LegDirection::EastWest => false,
+            LegDirection::NorthSouth => true,
+        }
     }
 
     /// The area that the legs are fitted to: from its edges the camera sees those of the survey area, as far as the fence allows.
@@ -214,6 +239,36 @@ impl PlannerChoice {
 #[cfg(test)]
 mod tests {
     use super::super::Footprint;
+    use super::*;
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::Polygon;
+
+    #[test]
+    fn legs_run_where_a_pass_is_shorter_or_as_configured() {
+        let area = Area { west: 0.0, south: 0.0, east: 60.0, north: 40.0 };
+        let mut grounds = Grounds::new(area, (2.0, 1.8), 1.0);
+        let runs_north = |grounds: &Grounds| {
+            let line = grounds.lattice().lines().remove(0);
+            grounds.lattice().place(line[0]).0 == grounds.lattice().place(line[1]).0
+        };
+        assert!(!runs_north(&grounds));
+        let (free_m, place) = (grounds.pass_m(), |x, y| DecimetrePoint::new(10 * x, 10 * y));
+        // Long walls from the south to the north.
+        let wall = |x| Polygon(vec![place(x, 3), place(x + 1, 3), place(x + 1, 37), place(x, 37)]);
+        grounds.set_fence(&Fence { keep_outs: (1..10).map(|n| wall(6 * n)).collect(), ..Fence::default() });
+        assert!(runs_north(&grounds));
+        let fenced_m = grounds.pass_m();
+        grounds.set_fence(&Fence::default());
+        assert!(!runs_north(&grounds) && (grounds.pass_m() - free_m).abs() < 1e-6);
+        for (direction, north) in [(LegDirection::EastWest, false), (LegDirection::NorthSouth, true)] {
+            let mut grounds = Grounds::new(area, (2.0, 1.8), 1.0);
+            grounds.set_legs(direction);
+            assert_eq!(runs_north(&grounds), north);
+            grounds.set_fence(&Fence { keep_outs: (1..10).map(|n| wall(6 * n)).collect(), ..Fence::default() });
+            assert_eq!(runs_north(&grounds), north);
+            assert!(north || grounds.pass_m() > 1.03 * fenced_m, "{} {fenced_m}", grounds.pass_m());
+        }
+    }
 
     #[test]
     fn legs_overlap_by_the_configured_part_of_a_frame() {

@@ -1,9 +1,10 @@
 // The fence in the panel: its outlines, their corners as numbers, their faults, sending.
 
+import { dryRun } from "../api.js";
 import { h, show, text } from "../dom.js";
 import { begin, fenceOrder, finish, pen, pickTool, planOf, setReturnPoint } from "../fence/edit.js";
-import { consequences, faults, fromServer, isSound } from "../fence/plan.js";
-import { count, metres, percent } from "../format.js";
+import { consequences, faults, fromServer, isSound, toOrder } from "../fence/plan.js";
+import { count, metres, percent, span } from "../format.js";
 import { inWorld } from "../map/frames.js";
 import { orderFoot } from "../order/foot.js";
 import { isVoid, slotOf } from "../order/status.js";
@@ -49,7 +50,7 @@ export function update() {
   foot.update(vehicle, !sound || isDrawing || wouldLiftUnknown(vehicle, plan));
   const found = sound && !isDrawing && fenceOrder.isChanged(vehicle) ? describePlan(vehicle, plan) : null;
   show(preview, found !== null);
-  text(preview, found ?? "");
+  text(preview, found === null ? askForPass(null) : found + askForPass(vehicle, plan));
   text(tools.fence, outlines[0]?.kind === "fence" ? "Extend fence" : "Draw fence");
   tools.returnPoint.setAttribute("aria-pressed", String(pen.tool === "return_point"));
   for (const [name, node] of Object.entries(tools)) show(node, (name === "done") === isDrawing);
@@ -76,6 +77,29 @@ function describePlan(vehicle, plan) {
     ? ` By its last report ${vehicle.name} is inside, ${metres(found.distance)} from the nearest edge.`
     : ` By its last report ${vehicle.name} is where it must not be, ${metres(found.distance)} from the nearest edge: it will refuse this order.`;
   return `Area ${count(found.area)} m\u00b2.${cut}${where}`;
+}
+
+/** How long a survey in straight legs takes within a plan, once the surface has told it; asked for when the plan rests. */
+const pass = { key: null, told: "", timer: 0 };
+const REST_MS = 400;
+
+function askForPass(vehicle, plan) {
+  const key = vehicle && JSON.stringify([vehicle.id, toOrder(plan)]);
+  if (key === pass.key) return pass.told;
+  clearTimeout(pass.timer);
+  Object.assign(pass, { key, told: "" });
+  if (key !== null) pass.timer = setTimeout(() => tellPass(key, vehicle.id, toOrder(plan)), REST_MS);
+  return "";
+}
+
+async function tellPass(key, id, fence) {
+  // The order itself is refused with the reason.
+  const found = await dryRun(id, { fence }).catch(() => null);
+  if (pass.key !== key || !found) return;
+  pass.told = found.pass
+    ? ` One pass in straight legs within it takes about ${span(found.pass.time_s)}, ${metres(found.pass.metres, 0)}.`
+    : " It leaves no straight legs of the survey.";
+  store.emit("edit");
 }
 
 /** The centres of the explored cells in the world, for the version of the map that was looked at last. */

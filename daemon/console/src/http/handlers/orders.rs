@@ -9,8 +9,8 @@ use axum::response::Response;
 use axum::routing::{MethodRouter, post};
 use scenecast_protocol::directive::SlotId;
 use scenecast_surface::{
-    AgainOrder, BudgetOrder, CONSTRAINT_NAMES, CommandAction, CommandOrder, CommandOrderAction, DraftOrder, Giver,
-    MarkerOrder, NoteOrder, SurfaceRequest, UtilityOrder,
+    AgainOrder, BudgetOrder, CONSTRAINT_NAMES, CommandAction, CommandOrder, CommandOrderAction, DraftOrder,
+    DryRunOrder, Giver, MarkerOrder, NoteOrder, SurfaceRequest, UtilityOrder,
 };
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -46,10 +46,13 @@ pub(in crate::http) async fn utility(
 pub(in crate::http) async fn dry_run(
     State(shared): State<Shared>,
     VehicleId(id): VehicleId,
-    JsonOrder(order): JsonOrder<UtilityOrder>,
+    JsonOrder(order): JsonOrder<DryRunOrder>,
 ) -> Response {
     match by_label(order.weights) {
-        Ok(weights) => shared.respond(SurfaceRequest::DryRun(id, weights, (order.exploration, order.curiosity))).await,
+        Ok(weights) => {
+            let terms = (order.exploration, order.curiosity);
+            shared.respond(SurfaceRequest::DryRun(id, weights, terms, order.fence)).await
+        }
         Err(unknown) => error(StatusCode::UNPROCESSABLE_ENTITY, unknown),
     }
 }

@@ -5,8 +5,8 @@ use crate::http::handlers::orders as handlers;
 use axum::routing::post;
 use scenecast_surface::state::DryRun;
 use scenecast_surface::{
-    AgainOrder, AreasOrder, BudgetOrder, ConstraintsOrder, DestinationOrder, ExemplarOrder, FenceOrder, LimitsOrder,
-    RestoreOrder, Role, SettingsOrder, SurfaceRequest, TakeOverOrder, UtilityOrder,
+    AgainOrder, AreasOrder, BudgetOrder, ConstraintsOrder, DestinationOrder, DryRunOrder, ExemplarOrder, FenceOrder,
+    LimitsOrder, RestoreOrder, Role, SettingsOrder, SurfaceRequest, TakeOverOrder, UtilityOrder,
 };
 
 /// The operations that give a vehicle orders.
@@ -25,8 +25,9 @@ pub(super) fn operations() -> Vec<Operation> {
             ..order(
                 "/api/v2/vehicles/{id}/dry-run",
                 "dry_run",
-                "Plans what the vehicle would do by these weights, with its own planner on the surface's map; nothing is sent",
-                schema::<UtilityOrder>,
+                "Plans what the vehicle would do by these weights and within this fence, with its own planner on the surface's map, and tells how long one \
+                 pass in straight legs takes; nothing is sent",
+                schema::<DryRunOrder>,
                 || post(handlers::dry_run),
             )
         },
