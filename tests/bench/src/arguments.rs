@@ -4,6 +4,7 @@
 
 use crate::console::ConsoleBench;
 use crate::exemplar::ExemplarBench;
+use crate::faults::FaultsBench;
 use crate::frame::FrameBench;
 use crate::inference::InferenceBench;
 use crate::labels::LabelsBench;
@@ -40,6 +41,8 @@ enum Bench {
     Console(ConsoleBench),
     /// Exemplars: seconds from the order to the image under full load, bytes for a similarity of 0.9.
     Exemplar(ExemplarBench),
+    /// Faults of modems and their ports: seconds until data flow again.
+    Faults(FaultsBench),
     /// Vehicles that lose the folder with their orders: what they do, and when they have them again.
     Forget(ForgetBench),
     /// A camera frame at the vehicle: CPU time from the image to the map that the link sends, as the map grows.
@@ -81,6 +84,7 @@ impl Arguments {
         match self.bench {
             Bench::Console(c) => c.run(),
             Bench::Exemplar(e) => e.run(),
+            Bench::Faults(f) => f.run(),
             Bench::Forget(f) => f.run(),
             Bench::Frame(f) => f.run(),
             Bench::Inference(i) => i.run(),

@@ -6,6 +6,7 @@ mod arguments;
 mod console;
 mod cpu_meter;
 mod exemplar;
+mod faults;
 mod frame;
 mod inference;
 mod labels;

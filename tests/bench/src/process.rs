@@ -2,7 +2,7 @@
 
 use scenecast_core::UserError;
 use std::net::TcpListener;
-use std::process::{Child, Command};
+use std::process::{Child, ChildStdin, Command};
 use std::time::{Duration, Instant};
 
 /// A process that ends with the measurement.
@@ -12,6 +12,11 @@ impl Process {
     pub(crate) fn start(command: &mut Command) -> Result<Self, UserError> {
         let spawned = command.spawn();
         spawned.map(Self).map_err(|e| UserError::file(command.get_program().as_ref(), format!("does not start: {e}")))
+    }
+
+    /// Its standard input, once, if that is a pipe.
+    pub(crate) fn take_input(&mut self) -> Option<ChildStdin> {
+        self.0.stdin.take()
     }
 
     /// Ends it as a person would, and waits for it.

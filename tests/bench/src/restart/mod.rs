@@ -114,7 +114,7 @@ fn summary(all: &[(u32, RestartRun)]) -> RestartFigures {
 }
 
 /// Records the frames of a mission, which every run plays.
-fn record(dir: &Path) -> Result<(), UserError> {
+pub(crate) fn record(dir: &Path) -> Result<(), UserError> {
     let sets = [
         format!("survey.duration_s={RECORDED_S}"),
         "camera.width_px=320".to_owned(),
