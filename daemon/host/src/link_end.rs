@@ -62,6 +62,9 @@ pub trait LinkEnd {
     /// The modem repeated this many bits by itself.
     fn handle_repeated(&mut self, bits: u64, now: Instant);
 
+    /// The modem has restarted, what it held is lost, and it is ready again.
+    fn handle_modem_restart(&mut self, _now: Instant) {}
+
     /// The modem's USBL head measured the position of another end.
     fn handle_range(&mut self, _end: Address, _line: &UsblLine, _now: Instant) {}
 
@@ -139,6 +142,10 @@ impl<R: StateReplica> LinkEnd for SurfaceLink<R> {
         views.fold(unknown, |counts, view| counts.add(view.stats()))
     }
 
+    fn handle_modem_restart(&mut self, now: Instant) {
+        self.handle_modem_restart(now);
+    }
+
     fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
         self.poll_cycle(now)
     }
@@ -160,6 +167,10 @@ impl LinkEnd for scenecast_surface::Surface {
 
     fn handle_range(&mut self, end: Address, line: &UsblLine, now: Instant) {
         self.handle_range(end, line, now);
+    }
+
+    fn handle_modem_restart(&mut self, now: Instant) {
+        self.handle_modem_restart(now);
     }
 
     fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {

@@ -218,7 +218,9 @@ impl<E: LinkEnd> LinkHost<E> {
                 ModemEvent::Repeated(bits) => self.end.handle_repeated(bits, now),
                 ModemEvent::Fix(end, line) => self.end.handle_range(end, &line, now),
                 ModemEvent::Ready => {
-                    self.was_ready = true;
+                    if std::mem::replace(&mut self.was_ready, true) {
+                        self.end.handle_modem_restart(now);
+                    }
                     self.events.push_back(FrameEvent::ModemReady);
                 }
                 ModemEvent::Lost => self.events.push_back(FrameEvent::ModemLost),

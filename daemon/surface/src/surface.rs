@@ -404,6 +404,11 @@ impl Surface {
         self.link.handle_transmit_outcome(now);
     }
 
+    /// The modem has restarted, what it held is lost, and it is ready again.
+    pub fn handle_modem_restart(&mut self, now: Instant) {
+        self.link.handle_modem_restart(now);
+    }
+
     /// The modem requests a number of frames.
     pub fn handle_poll(&mut self, frames: u32) {
         self.link.handle_poll(frames);

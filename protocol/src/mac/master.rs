@@ -197,6 +197,14 @@ impl Master {
         self.state = MediumState::Granted { granted: now, until };
     }
 
+    /// The surface's modem has restarted, perhaps with the grant still in it: an answer is waited for as if that went out now.
+    pub fn handle_modem_restart(&mut self, profile: &ModemProfile, now: Instant) {
+        let longest = now + self.flight() + profile.turn_around;
+        if let MediumState::Granted { until, .. } = &mut self.state {
+            *until = (*until).min(longest);
+        }
+    }
+
     /// Takes a measurement of the two-way propagation time.
     pub fn handle_round_trip(&mut self, measured: Duration, now: Instant) {
         if measured <= self.config.max_propagation * 8 {
@@ -313,6 +321,24 @@ mod tests {
             [(500, 0), (700, 100), (900, 310), (800, 320)].map(|(ms, at_s)| measure(ms, at_s)),
             [500, 500, 700, 700]
         );
+    }
+
+    #[test]
+    fn a_grant_that_a_restart_of_the_modem_took_is_given_again_soon() {
+        let now = Instant::from_secs_f64(100.0);
+        let mut master = Master::new(MasterConfig::default(), now);
+        master.handle_round_trip(Duration::from_secs(1), now);
+        master.begin(40, now);
+        master.handle_turn_sent(&PROFILE, 20, now);
+        let again = now + Duration::from_secs(2);
+        assert!(!master.may_speak(true, again), "the answer may take so long");
+        master.handle_modem_restart(&PROFILE, now + Duration::from_millis(200));
+        assert!(!master.may_speak(true, now + Duration::from_secs(1)) && master.may_speak(true, again));
+        master.begin(40, again);
+        master.handle_turn_sent(&PROFILE, 0, again);
+        let until = master.end_of_turn();
+        master.handle_modem_restart(&PROFILE, until.unwrap());
+        assert_eq!(master.end_of_turn(), until, "never later");
     }
 
     #[test]

@@ -225,6 +225,15 @@ impl<R: StateReplica> SurfaceLink<R> {
         self.has_cycle().then(|| self.cycle.began + GIVE_UP)
     }
 
+    /// The modem has restarted and is ready again: what it held is lost. A modem that is polled begins its cycles again itself.
+    pub fn handle_modem_restart(&mut self, now: Instant) {
+        if self.config.modem.access != Access::Polled
+            && let Some(peer) = self.fleet.current_mut()
+        {
+            peer.master.handle_modem_restart(&self.config.modem, now);
+        }
+    }
+
     /// The modem requests `frames` frames of the surface's own cycle.
     pub fn handle_poll(&mut self, frames: u32) {
         self.cycle.polled = frames;

@@ -97,6 +97,10 @@ impl Link {
                 format!("modem.device={}", devices.join(device).display()),
                 format!("runtime.state_dir={}", dir.join(role).display()),
             ];
+            // All that is not set is as by default.
+            let file = dir.join(format!("{role}.toml"));
+            fs::write(&file, "").map_err(|e| UserError::file(&file, e))?;
+            end.arg("--config").arg(file);
             for key in both.iter().chain(&keys).chain(own) {
                 end.arg("--set").arg(key);
             }

@@ -12,6 +12,8 @@ use std::time::Duration;
 const TRAVEL: Duration = Duration::from_secs(2);
 /// Time for modems to decode and turn around, and for hosts to answer.
 const SLACK: Duration = Duration::from_secs(2);
+/// Time for the modem to decode the end of a packet that it hears.
+const DECODING: Duration = Duration::from_millis(500);
 /// A vehicle is never so fast that the way to it and back grows by more than a hundredth of the time (7.5 m/s).
 const RECEDES: u32 = 100;
 /// After a refusal of the modem.
@@ -173,7 +175,7 @@ impl Micromodem {
 
     /// A packet begins to be heard: if it is the one that we have asked for, it is waited out.
     fn handle_packet(&mut self, now: Instant) {
-        let packet = self.config.rate.packet() + self.fill_time() + SLACK;
+        let packet = self.config.rate.packet() + self.fill_time() + DECODING;
         if let Some(begun) = self.cycles.begun.as_mut().filter(|b| !b.ours) {
             self.cycles.answered = Some((now.since(begun.at), now));
             begun.until = begun.until.max(now + packet);

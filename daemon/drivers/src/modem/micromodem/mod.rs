@@ -22,7 +22,11 @@ use std::time::Duration;
 /// Quiet before the modem is spoken to, and after its banner.
 const SETTLE: Duration = Duration::from_millis(300);
 /// Longest wait for the echo of a sentence.
-const REPLY_TIMEOUT: Duration = Duration::from_secs(3);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
+/// The same at work, where all frames in the modem are forgotten after it.
+const REPLY_TIMEOUT_AT_WORK: Duration = Duration::from_secs(2);
+/// A line that has been idle for this long brings no reply any more.
+const QUIET: Duration = Duration::from_millis(500);
 /// Longest wait for a reply while other sentences arrive: the modem may have missed the command.
 const MAX_WAIT: Duration = Duration::from_secs(9);
 /// Between two questions to a modem at work.
@@ -144,7 +148,8 @@ impl Micromodem {
 
     fn ask(&mut self, body: &str, now: Instant) {
         self.say(body);
-        (self.asked, self.asked_at) = (Some(now + REPLY_TIMEOUT), now);
+        let wait = if self.phase == Phase::Ready { REPLY_TIMEOUT_AT_WORK } else { REPLY_TIMEOUT };
+        (self.asked, self.asked_at) = (Some(now + wait), now);
     }
 
     fn handle_setting(&mut self, name: &str, value: &str, now: Instant) {
@@ -207,9 +212,6 @@ impl Micromodem {
 
     fn handle_sentence(&mut self, sentence: &Sentence, now: Instant) {
         self.heard = now;
-        // An answer waits behind what else the modem has to say, which may take seconds on a slow line.
-        let latest = self.asked_at + MAX_WAIT;
-        self.asked = self.asked.map(|deadline| deadline.max((now + REPLY_TIMEOUT).min(latest)));
         match sentence.name.as_str() {
             "CACFG" => self.handle_setting(sentence.text(0), sentence.text(1), now),
             "CAREV" if sentence.text(1) == "INIT" => self.start_over(SETTLE, now),
@@ -283,6 +285,9 @@ impl Driver for Micromodem {
         if self.phase == Phase::Closed {
             return;
         }
+        // An answer waits behind what else the modem has to say, which may take seconds on a slow line.
+        let latest = self.asked_at + MAX_WAIT;
+        self.asked = self.asked.map(|deadline| deadline.max((now + QUIET).min(latest)));
         let mut found = Vec::new();
         self.parser.push(bytes, |sentence| found.push(sentence));
         for sentence in found {

@@ -3,7 +3,7 @@
 
 use super::line::{Line, LineParser};
 use super::setup::{S2cConfig, Step};
-use super::{MAX_REPLY_WAIT, REPLY_TIMEOUT};
+use super::{MAX_REPLY_WAIT, QUIET, REPLY_TIMEOUT};
 use crate::modem::driver::{Class, Token};
 use scenecast_core::ModemAddress;
 use scenecast_protocol::time::Instant;
@@ -127,11 +127,11 @@ impl Dialogue {
         self.pending = Some((pending, now + REPLY_TIMEOUT));
     }
 
-    /// A reply waits behind the modem's notices, which may take seconds on a slow line.
+    /// Bytes came in: a reply waits behind the modem's notices, which may take seconds on a slow line.
     pub(super) fn extend(&mut self, now: Instant) {
         let latest = self.sent_at + MAX_REPLY_WAIT;
         if let Some((_, deadline)) = &mut self.pending {
-            *deadline = (*deadline).max((now + REPLY_TIMEOUT).min(latest));
+            *deadline = (*deadline).max((now + QUIET).min(latest));
         }
     }
 

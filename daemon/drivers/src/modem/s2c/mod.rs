@@ -26,8 +26,10 @@ use std::time::Duration;
 
 /// Quiet before the modem is spoken to: half a line may be under way.
 const SETTLE: Duration = Duration::from_millis(300);
-/// Longest wait for a reply, beyond the transfer time of the line.
-const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
+/// Longest wait for a reply, beyond the transfer time of the line; modems take a tenth of it.
+const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
+/// A line that has been idle for this long brings no reply any more.
+const QUIET: Duration = Duration::from_millis(500);
 /// Longest wait for a reply while notices arrive: the reply may have been lost on the line.
 const MAX_REPLY_WAIT: Duration = Duration::from_secs(9);
 const DATA_MODE: Duration = Duration::from_millis(1500);
@@ -264,6 +266,8 @@ impl Driver for S2c {
         if self.phase == Phase::Closed {
             return;
         }
+        // A long line is under way for longer than an idle one is waited for.
+        self.dialogue.extend(now);
         self.dialogue.push(bytes);
         while let Some(line) = self.dialogue.next_line() {
             self.handle_line(line, now);

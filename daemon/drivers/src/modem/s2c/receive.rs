@@ -27,7 +27,6 @@ impl S2c {
             Line::Reply(name, text) => self.handle_reply(name.as_deref(), &text, now),
             Line::Notice(notice) => {
                 self.supervision.note_reply(now);
-                self.dialogue.extend(now);
                 self.handle_notice(notice, now);
             }
             // A port of the AT interpreter does not say whose data it is.
@@ -80,6 +79,7 @@ impl S2c {
         if heard.dst != self.config.address && heard.dst != EVERYBODY {
             return;
         }
+        heard.travel_us.into_iter().for_each(|us| self.supervision.handle_travel(us));
         let range_m = heard.travel_us.map(|us| f64::from(us) * 1e-6 * SOUND_SPEED_M_S);
         let quality = Some(heard.integrity);
         match heard.service {

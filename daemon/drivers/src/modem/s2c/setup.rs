@@ -41,7 +41,7 @@ fn step(command: impl Into<String>, expect: Expect) -> Step {
 }
 
 /// The start-up sequence; the `first` time, data in the modem belongs to another run.
-pub(super) fn start_up(config: &S2cConfig, first: bool) -> Vec<Step> {
+pub(super) fn start_up(config: &S2cConfig, wait_ms: u32, first: bool) -> Vec<Step> {
     // Later it is still good, and throwing it away would end the connection.
     let drop = if first { "Z4" } else { "Z3" };
     let mut steps = vec![
@@ -52,7 +52,7 @@ pub(super) fn start_up(config: &S2cConfig, first: bool) -> Vec<Step> {
         step("@ZX1", Expect::Ok),
         step("@ZU1", Expect::Tolerated),
     ];
-    for (key, value) in config.settings() {
+    for (key, value) in config.settings(wait_ms) {
         steps.push(step(format!("!{key}{value}"), Expect::Ok));
         steps.push(step(format!("?{key}"), Expect::Value(value)));
     }
@@ -61,11 +61,11 @@ pub(super) fn start_up(config: &S2cConfig, first: bool) -> Vec<Step> {
 }
 
 /// The regular query of a modem at work: every second time the packet counter, which a restart resets.
-pub(super) fn beat(config: &S2cConfig, number: usize) -> Step {
+pub(super) fn beat(config: &S2cConfig, wait_ms: u32, number: usize) -> Step {
     if number.is_multiple_of(2) {
         return step("?PC", Expect::Counter);
     }
-    let settings = config.settings();
+    let settings = config.settings(wait_ms);
     match (number / 2) % (settings.len() + 3) {
         0 => step("?AL", Expect::Address),
         1 => step("@ZX1", Expect::Ok),
@@ -113,9 +113,52 @@ pub(super) struct Supervision {
     /// The step of the start-up that failed last.
     failed: Option<Step>,
     refusal: Option<String>,
+    wait: ConnectionWait,
+}
+
+/// How long the modem waits for the answer to a request of a connection, milliseconds (`RT`).
+#[derive(Debug)]
+struct ConnectionWait {
+    set_ms: u32,
+    wanted_ms: u32,
+}
+
+impl Default for ConnectionWait {
+    fn default() -> Self {
+        Self { set_ms: Self::UNMEASURED_MS, wanted_ms: Self::UNMEASURED_MS }
+    }
+}
+
+impl ConnectionWait {
+    const UNMEASURED_MS: u32 = 4000;
+    /// What the modem takes.
+    const ALLOWED_MS: std::ops::RangeInclusive<u32> = 500..=12_000;
+    /// Beyond both ways: the other modem's header, and its turn.
+    const BEYOND_MS: u32 = 1500;
+    /// The wait is set anew if it is so far from what is wanted.
+    const NEAR_MS: u32 = 250;
+
+    /// Takes the travel time of something that was heard, one way, microseconds.
+    fn handle_travel(&mut self, travel_us: u32) {
+        let (least, most) = (*Self::ALLOWED_MS.start(), *Self::ALLOWED_MS.end());
+        self.wanted_ms = (travel_us / 500).saturating_add(Self::BEYOND_MS).clamp(least, most);
+    }
+
+    /// The wait to set, if it has changed.
+    fn next(&mut self) -> Option<u32> {
+        (self.wanted_ms.abs_diff(self.set_ms) > Self::NEAR_MS).then(|| {
+            self.set_ms = self.wanted_ms;
+            self.set_ms
+        })
+    }
 }
 
 impl Supervision {
+    /// Takes the travel time of something that was heard, one way, microseconds.
+    pub(super) fn handle_travel(&mut self, travel_us: u32) {
+        self.wait.handle_travel(travel_us);
+    }
+
     pub(super) fn open(&mut self, now: Instant) {
         (self.opened, self.last_reply) = (now, now);
     }
@@ -130,7 +173,7 @@ impl Supervision {
 
     /// The step of the start-up at `index`; `None` behind the last one.
     pub(super) fn start_up(&self, config: &S2cConfig, index: usize) -> Option<Step> {
-        setup::start_up(config, !self.was_ready).into_iter().nth(index)
+        setup::start_up(config, self.wait.set_ms, !self.was_ready).into_iter().nth(index)
     }
 
     pub(super) fn set_ready(&mut self, now: Instant) {
@@ -149,8 +192,11 @@ impl Supervision {
             return None;
         }
         self.beat_at = now + BEAT_INTERVAL;
+        if let Some(wait_ms) = self.wait.next() {
+            return Some(step(format!("!RT{wait_ms}"), Expect::Ok));
+        }
         self.beats += 1;
-        Some(setup::beat(config, self.beats))
+        Some(setup::beat(config, self.wait.set_ms, self.beats))
     }
 
     pub(super) fn counter(&self) -> Option<u32> {
@@ -216,9 +262,9 @@ impl S2cConfig {
     /// Settings to write and to read back.
     ///
     /// No retries of messages: duplicates cost airtime, and the driver repeats by itself. Two retries of a
-    /// connection: more would keep on speaking for long to a modem that has restarted. Idle connections end soon, so
-    /// that others get to speak.
-    pub(super) fn settings(&self) -> [(&'static str, u32); 10] {
+    /// connection: more would keep on speaking for long to a modem that has restarted, and so would a longer wait for it than the
+    /// travel time asks for. Idle connections end soon, so that others get to speak.
+    pub(super) fn settings(&self, wait_ms: u32) -> [(&'static str, u32); 10] {
         [
             ("L", self.source_level.into()),
             ("AM", self.highest_address.into()),
@@ -226,7 +272,7 @@ impl S2cConfig {
             ("ZC", self.cluster.into()),
             ("ZP", self.packet_ms.into()),
             ("RC", 2),
-            ("RT", 4000),
+            ("RT", wait_ms),
             ("RI", 0),
             ("ZI", 20),
             ("RP", 0),
