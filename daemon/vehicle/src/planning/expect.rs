@@ -29,7 +29,7 @@ pub struct Expectation<'a> {
 }
 
 /// Reach of the influence of a label, in lengths over which labels of the map are alike.
-const REACH: f32 = 1.0;
+const REACH: f32 = 0.5;
 /// Reach of the steeper fade, in the same lengths.
 const NEXT: f32 = 0.1;
 /// The count of an unseen cell under the steeper fade, with the shares of the map. It prevents a division by 0
