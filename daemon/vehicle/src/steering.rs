@@ -79,8 +79,6 @@ pub struct Steering {
     intent: Option<Intent>,
     /// An adaptive plan found nothing that pays.
     is_complete: bool,
-    /// The vehicle goes to a place beside its survey.
-    is_away: bool,
 }
 
 /// The last two places of the lattice that the vehicle was at.
@@ -88,6 +86,8 @@ pub struct Steering {
 struct LatticeTrack {
     here: Option<Node>,
     before: Option<Node>,
+    /// The vehicle goes to a place beside its survey.
+    is_away: bool,
 }
 
 impl LatticeTrack {
@@ -125,7 +125,6 @@ impl Steering {
             planned_for: 0,
             intent: None,
             is_complete: false,
-            is_away: false,
         }
     }
 
@@ -249,7 +248,7 @@ impl Steering {
         self.handle_interest(map.0, utility);
         let left_m = left_m - self.grounds.last_leg_m();
         let Some(at) = self.grounds.entry(from) else { return Course::NoPath };
-        self.is_away = false;
+        self.track.is_away = false;
         let approach = distance(from, self.grounds.lattice().place(at));
         self.track.handle_place(at);
         let adapts = self.choice.adapts();

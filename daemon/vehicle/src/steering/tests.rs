@@ -67,7 +67,7 @@ fn a_fence_that_leaves_a_leg_as_it_is_keeps_the_progress() {
 }
 
 #[test]
-fn a_leg_that_was_left_for_a_destination_is_flown_from_where_it_was_left() {
+fn a_leg_left_for_a_destination_is_flown_from_there() {
     let map = LabelGrid::default();
     let mut steering = steering(PlannerKind::Horizon);
     let track = drive(&mut steering, &map, None, 6);

@@ -25,7 +25,7 @@ impl Steering {
 
     /// Tells the planner where the survey is left, once.
     fn leave_survey(&mut self, from: Point) {
-        if !std::mem::replace(&mut self.is_away, true)
+        if !std::mem::replace(&mut self.track.is_away, true)
             && let Some(at) = self.grounds.entry(from)
         {
             self.choice.planner_mut().handle_leave(at, self.grounds.lattice());

@@ -135,7 +135,7 @@ impl ConnectionWait {
     const ALLOWED_MS: std::ops::RangeInclusive<u32> = 500..=12_000;
     /// Beyond both ways: the other modem's header, and its turn.
     const BEYOND_MS: u32 = 1500;
-    /// The wait is set anew if it is so far from what is wanted.
+    /// The wait is set again if it is so far from what is wanted.
     const NEAR_MS: u32 = 250;
 
     /// Takes the travel time of something that was heard, one way, microseconds.
