@@ -1,6 +1,6 @@
 //! The processes of a link: two emulated modems, a vehicle and a surface, and the frames that their records have.
 
-use super::{FaultyEnd, LinkKind, PlannedFault, Recovery, plan, until_next};
+use super::{FaultyEnd, LinkKind, NO_FAULT, PlannedFault, Recovery, plan, until_next};
 use crate::process::{Process, free_port};
 use scenecast_core::UserError;
 use scenecast_files::{mission_records, read_record};
@@ -40,7 +40,9 @@ pub(super) fn run(
         std::thread::sleep((began + *at).duration_since(SystemTime::now()).unwrap_or_default());
         let (seconds, begin_s) = (length.as_secs(), unix_s());
         let seconds = if seconds > 0 { format!(" {seconds}") } else { String::new() };
-        writeln!(link.commands, "fault {} {name}{seconds}", end.name()).map_err(fault)?;
+        if *name != NO_FAULT {
+            writeln!(link.commands, "fault {} {name}{seconds}", end.name()).map_err(fault)?;
+        }
         ends.push((begin_s, begin_s + length.as_secs_f64()));
     }
     std::thread::sleep(REST);

@@ -67,7 +67,8 @@ impl FaultyEnd {
 }
 
 /// Each fault as the emulator names it, and how long it lasts, seconds.
-pub(crate) const FAULTS: [(&str, u64); 8] = [
+pub(crate) const FAULTS: [(&str, u64); 9] = [
+    (NO_FAULT, 0),
     ("reboot", 0),
     ("brown_out", 0),
     ("half_line", 0),
@@ -77,6 +78,9 @@ pub(crate) const FAULTS: [(&str, u64); 8] = [
     ("freeze", 5),
     ("unplug", 5),
 ];
+
+/// What the others are compared with; the emulator is told nothing.
+const NO_FAULT: &str = "none";
 
 /// Time from the end of one fault to the next one, if all goes well.
 const PAUSE: Duration = Duration::from_secs(22);

@@ -1,6 +1,6 @@
 //! `scenecast-bench restart`
 
-use super::{RestartRun, RestartSetting, forget, record, restarts};
+use super::{RECORDED_S, RestartRun, RestartSetting, forget, record, restarts};
 use crate::program::ProgramArgument;
 use clap::Args;
 use scenecast_core::UserError;
@@ -90,7 +90,7 @@ impl ForgetBench {
         let program = self.program.path()?;
         let dir = std::env::temp_dir().join(format!("scenecast-forget-{}", std::process::id()));
         let recording = dir.join("recording");
-        record(&recording)?;
+        record(&recording, RECORDED_S)?;
         println!("run  safe after s  orders again after s");
         for number in 1..=self.runs {
             let run = forget::run(&program, &dir.join(format!("run-{number}")), &recording, number)

@@ -64,7 +64,7 @@ pub struct RestartFigures {
 /// Runs the bench; `show` is called after each run.
 pub fn restarts(setting: &RestartSetting, show: &mut dyn FnMut(u32, &RestartRun)) -> Result<RestartFigures, UserError> {
     let recording = setting.dir.join("recording");
-    record(&recording)?;
+    record(&recording, RECORDED_S)?;
     let (next, stop) = (AtomicU32::new(1), AtomicBool::new(false));
     let (sender, done) = mpsc::channel();
     let mut all = Vec::new();
@@ -114,9 +114,9 @@ fn summary(all: &[(u32, RestartRun)]) -> RestartFigures {
 }
 
 /// Records the frames of a mission, which every run plays.
-pub(crate) fn record(dir: &Path) -> Result<(), UserError> {
+pub(crate) fn record(dir: &Path, duration_s: f64) -> Result<(), UserError> {
     let sets = [
-        format!("survey.duration_s={RECORDED_S}"),
+        format!("survey.duration_s={duration_s}"),
         "camera.width_px=320".to_owned(),
         "camera.height_px=240".to_owned(),
         "operator.script=none".to_owned(),
