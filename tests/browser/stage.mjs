@@ -64,8 +64,8 @@ export class Stage {
     this.page.on("request", (r) => {
       if (r.method() !== "POST") return;
       this.orders.push(r);
-      // Drafts follow the sliders by themselves.
-      if (!r.url().endsWith("/draft")) this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() });
+      // Drafts follow the sliders by themselves, and a dry run is no order.
+      if (!/\/(draft|dry-run)$/.test(r.url())) this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() });
     });
     const theme = story.theme ?? "light";
     // Command of a demo passes from story to story, which are one client.
